@@ -113,9 +113,8 @@ fn what_is_asked_for_comes_at_its_time() -> Result<(), StartError> {
 #[test]
 fn calls_are_answered_and_may_ask_for_more_and_casts_are_taken() -> Result<(), Failure> {
     let sum = summing::sensor::base::number::sum;
-    let builder = Summing::builder();
-    let sums = builder.subscribe(sum);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Summing::builder().simulate()?;
+    let sums = simulation.subscribe(sum);
     simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
     simulation.cast(sum, Add(40.0))?;
     assert_eq!(simulation.call(sum, HowMuch(Request::Timeout(Duration::from_millis(50))))?, 42.0);
@@ -214,9 +213,8 @@ robot! {
 /// Estimators that are left out do not exist; those that take their outputs have an input that never comes.
 #[test]
 fn an_estimator_may_be_left_out() -> Result<(), StartError> {
-    let builder = Partial::builder();
-    let health = builder.subscribe(system::Health);
-    let mut simulation = armed_simulation(builder);
+    let mut simulation = armed_simulation(Partial::builder());
+    let health = simulation.subscribe(system::Health);
     simulation.publish(partial::sensor::base::number, at(5), Number(1.0));
     simulation.run_until(at(500));
     assert_eq!(simulation.state(), "idle", "no command has run");

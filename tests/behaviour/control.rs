@@ -52,9 +52,9 @@ fn follow(context: &ServiceContext) -> Result<Update, Fault> {
     }))
 }
 
-/// Counts what there is; one of the topics is of the right type, or an error names what is wrong.
-fn dashboard(context: &ServiceContext, path: &str) -> Result<Update, Fault> {
-    context.bus().subscribe::<Number>(path, Overflow::default())?.matched()?;
+/// Counts what there is; one of the topics is of the right type.
+fn dashboard(context: &ServiceContext) -> Result<Update, Fault> {
+    context.bus().subscribe::<Number>("sensor/base/pan/encoder", Overflow::default())?.matched()?;
     let all = context.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default());
     Ok(Box::new(move |_| Ok(Reading::now(Number(all.drain().count() as f64)))))
 }
@@ -78,7 +78,7 @@ robot! {
     }
 
     controllers { controller follow: Pulse(init = follow) { rate: 10 Hz; } }
-    bridges { bridge dashboard: Pulse(init = |context| dashboard(context, "sensor/base/pan/encoder")) { rate: 10 Hz; } }
+    bridges { bridge dashboard: Pulse(init = dashboard) { rate: 10 Hz; } }
 
     link base {
         joint pan: continuous {
@@ -143,8 +143,10 @@ fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> 
     assert!(simulation.command(commanded::command::go, millis(1)).is_err(), "by default only when idle");
     let lost = simulation.command(commanded::command::watch, Target { millis: 1, does: Some("lost") })?;
     simulation.run_until(at(20));
-    let error = lost.try_result().expect("it has ended").expect_err("there is no such state").to_string();
-    assert_eq!(error, "the command failed: it names the next state `lost`, which is not declared");
+    assert_refused(
+        lost.try_result().expect("it has ended"),
+        "the command failed: it names the next state `lost`, which is not declared",
+    );
     assert_eq!(simulation.state(), "parked");
     Ok(())
 }
@@ -152,9 +154,8 @@ fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> 
 #[test]
 fn a_command_that_fails_times_out_or_is_cancelled_is_reported() -> Result<(), Failure> {
     let _alone = alone();
-    let builder = Commanded::builder();
-    let events = builder.subscribe(commanded::command::go);
-    let mut simulation = armed_simulation(builder);
+    let mut simulation = armed_simulation(Commanded::builder());
+    let events = simulation.subscribe(commanded::command::go);
     let mut outcome = |target, cancelled_at: Option<i64>| -> Result<_, Failure> {
         let start = simulation.clock().now();
         let execution = simulation.command(commanded::command::go, target)?;
@@ -186,8 +187,10 @@ fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Failure> {
     let mut simulation = armed_simulation(Commanded::builder());
     let first = simulation.command(commanded::command::turn, millis(500))?;
     let second = simulation.command(commanded::command::turn, millis(500))?;
-    let refusal = simulation.command(commanded::command::turn, millis(500)).expect_err("two are the limit");
-    assert_eq!(refusal.to_string(), "`turn` is refused: 2 of the category `motion` run already, and no more may");
+    assert_refused(
+        simulation.command(commanded::command::turn, millis(500)),
+        "`turn` is refused: 2 of the category `motion` run already, and no more may",
+    );
     let watching = simulation.command(commanded::command::watch, millis(500))?;
     simulation.run_until(at(100));
     assert!(
@@ -267,30 +270,13 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failu
 #[test]
 fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Failure> {
     let _alone = alone();
-    let builder = Commanded::builder();
-    let (follow, counts) =
-        (builder.subscribe(commanded::controller::follow), builder.subscribe(commanded::bridge::dashboard));
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Commanded::builder().simulate()?;
+    let follow = simulation.subscribe(commanded::controller::follow);
+    let counts = simulation.subscribe(commanded::bridge::dashboard);
     simulation.run_until(at(150));
     simulation.arm().expect("it may be armed");
     simulation.run_until(at(350));
     assert_eq!(numbers(&follow), [0.0, 0.0, 1.0, 1.0]);
     assert_eq!(numbers(&counts), [1.0, 10.0, 10.0, 10.0]);
-    let rows: [(MakeUpdate, &str); 2] = [
-        (
-            |context| dashboard(context, "sensor/base/pan/encodre"),
-            "nothing publishes at `sensor/base/pan/encodre`; did you mean `sensor/base/pan/encoder`?",
-        ),
-        (
-            |context| dashboard(context, "state_machine"),
-            "`state_machine` publishes `StateTransition`, not `Number`",
-        ),
-    ];
-    for (init, message) in rows {
-        let mut builder = Commanded::builder();
-        builder.options(commanded::bridge::dashboard).init = init;
-        let error = builder.simulate().expect_err("there is none").to_string();
-        assert_eq!(error, format!("bridge/dashboard cannot start: {message}"));
-    }
     Ok(())
 }

@@ -40,17 +40,6 @@ fn stop(_: f64) -> Done {
     Ok(())
 }
 
-/// Another actuator, which hangs.
-fn brake(_: f64) -> Done {
-    HERE.pass("another actuator's command");
-    Ok(())
-}
-
-fn unbrake(_: f64) -> Done {
-    HERE.pass("another actuator's disarm");
-    Ok(())
-}
-
 robot! {
     robot Hanging;
 
@@ -66,7 +55,10 @@ robot! {
         joint tilt: continuous {
             axis: y;
             sensor encoder: External<Number>();
-            actuator brake: Servo(command = brake, disarm = unbrake);
+            actuator brake: Servo(
+                command = |_| HERE.done("another actuator's command"),
+                disarm = |_| HERE.done("another actuator's disarm"),
+            );
             link lens { }
         }
         joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Servo(disarm = stop); link head { } }

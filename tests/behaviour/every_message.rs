@@ -110,9 +110,8 @@ fn what_a_run_sees() -> Result<(), StartError> {
         ("as the driver it is one message a run", driven, "c0; f1: f1; f2: f2"),
     ];
     for (row, estimator, steps) in rows {
-        let builder = Witnessed::builder();
-        let seen = builder.subscribe(estimator);
-        let mut simulation = builder.simulate()?;
+        let mut simulation = Witnessed::builder().simulate()?;
+        let seen = simulation.subscribe(estimator);
         let publish = |run: &mut Simulation<Witnessed>, input: &str, millis: i64| {
             let (sensor, number) = match input {
                 "c" => (witnessed::sensor::base::clock, millis as f64),

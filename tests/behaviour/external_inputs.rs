@@ -69,13 +69,12 @@ robot! {
 
 #[test]
 fn what_other_code_publishes_is_an_input_like_any_other() -> Result<(), Failure> {
-    let builder = Mapped::builder();
-    let fused = builder.subscribe(mapped::estimator::base::fused);
-    let echoes = builder.subscribe(mapped::estimator::base::echo);
-    let sums = builder.subscribe(mapped::estimator::base::mast::top::sum);
-    let scales = builder.subscribe(mapped::slam::scale);
-    let changes = builder.subscribe(system::Health);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Mapped::builder().simulate()?;
+    let fused = simulation.subscribe(mapped::estimator::base::fused);
+    let echoes = simulation.subscribe(mapped::estimator::base::echo);
+    let sums = simulation.subscribe(mapped::estimator::base::mast::top::sum);
+    let scales = simulation.subscribe(mapped::slam::scale);
+    let changes = simulation.subscribe(system::Health);
     let bus = simulation.bus();
     // Its subscribers may be there before its publishers.
     let by_path = bus.subscribe::<Number>("slam/scale", Overflow::default())?;

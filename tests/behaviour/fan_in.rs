@@ -177,9 +177,8 @@ robot! {
 
 #[test]
 fn what_is_derived_from_a_message_arrives_before_those_that_take_both() -> Result<(), StartError> {
-    let builder = Diamond::builder();
-    let both = builder.subscribe(diamond::estimator::base::both);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Diamond::builder().simulate()?;
+    let both = simulation.subscribe(diamond::estimator::base::both);
     simulation.run_to_end();
     let seen: Vec<_> = both.drain().map(|seen| (seen.driver, seen.second, seen.third, seen.third_is_new)).collect();
     assert_eq!(seen, [0.0, 1.0, 2.0, 3.0, 4.0].map(|number| (number, 10.0 * number, number, true)));

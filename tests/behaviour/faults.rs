@@ -35,34 +35,39 @@ robot! {
 
 #[test]
 fn a_component_that_cannot_start_is_named_and_those_before_it_are_stopped() {
-    let before = TERMINATED.load(Ordering::SeqCst);
-    let refused = |change: fn(&mut Builder<Patient>)| {
+    let _alone = one_at_a_time();
+    type Change = fn(&mut Builder<Patient>);
+    let cases: [(Change, &str); 4] = [
+        (
+            |builder| builder.options(patient::sensor::base::last).init = |_| Err(Fault::new("no device")),
+            "last cannot start: no device",
+        ),
+        (
+            |builder| builder.options(patient::sensor::base::numbers::first).init = |_| Err(Fault::new("no map")),
+            "numbers/first cannot start: no map",
+        ),
+        (
+            |builder| builder.options(patient::sensor::base::numbers::first).init = |_| panic!("no map at all"),
+            "numbers/first cannot start: panicked: no map at all",
+        ),
+        (
+            |builder| builder.options(patient::sensor::base::numbers::second).factor = f64::NAN,
+            "numbers/second cannot start: option `factor` is NaN, but must be in -1e3..=1e3",
+        ),
+    ];
+    // The estimator `first` is stopped in order if it has started.
+    for ((change, says), stopped) in cases.into_iter().zip([1, 0, 0, 1]) {
         let mut builder = Patient::builder();
         change(&mut builder);
-        builder.simulate().expect_err("it cannot start").to_string()
-    };
-    assert_eq!(
-        refused(|builder| builder.options(patient::sensor::base::last).init = |_| Err(Fault::new("no device"))),
-        "sensor/base/last cannot start: no device"
-    );
-    assert_eq!(TERMINATED.load(Ordering::SeqCst), before + 1, "what had started is stopped in order");
-    assert_eq!(
-        refused(|builder| builder.options(patient::sensor::base::numbers::first).init =
-            |_| Err(Fault::new("there is no map"))),
-        "sensor/base/numbers/first cannot start: there is no map"
-    );
-    assert_eq!(
-        refused(|builder| builder.options(patient::sensor::base::numbers::first).init = |_| panic!("no map at all")),
-        "sensor/base/numbers/first cannot start: panicked: no map at all"
-    );
-    assert_eq!(
-        refused(|builder| builder.options(patient::sensor::base::numbers::second).factor = f64::NAN),
-        "sensor/base/numbers/second cannot start: option `factor` is NaN, but must be in -1e3..=1e3"
-    );
+        let before = TERMINATED.load(Ordering::SeqCst);
+        assert_refused(builder.simulate(), &format!("sensor/base/{says}"));
+        assert_eq!(TERMINATED.load(Ordering::SeqCst) - before, stopped, "{says}");
+    }
 }
 
 #[test]
 fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), StartError> {
+    let _alone = one_at_a_time();
     let errs =
         |count: &mut f64, number| third(count, number, || Err(Fault::new("covariance is not positive definite")));
     let panics = |count: &mut f64, number| third(count, number, || panic!("index out of bounds"));
@@ -71,10 +76,8 @@ fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), St
     for (input, message) in rows {
         let mut builder = Patient::builder();
         builder.options(patient::sensor::base::numbers::first).input = input;
-        let (first, second) = (
-            builder.subscribe(patient::sensor::base::numbers::first),
-            builder.subscribe(patient::sensor::base::numbers::second),
-        );
+        let first = builder.subscribe(patient::sensor::base::numbers::first);
+        let second = builder.subscribe(patient::sensor::base::numbers::second);
         let mut simulation = builder.simulate()?;
         // The sensor beside it breaks at 100 ms and, restarted, at 210 ms; the estimator at 200 ms.
         simulation.run_until(at(320));

@@ -107,13 +107,12 @@ robot! {
 #[test]
 fn transforms_are_the_products_of_the_fixed_joints() -> Result<(), StartError> {
     let _alone = one_at_a_time();
-    let builder = Mast::builder();
-    let here = builder.subscribe(mast::estimator::base::here);
-    let back = builder.subscribe(mast::estimator::base::mount::mast::tip::top::back);
-    let at_joint = builder.subscribe(mast::estimator::base::mount::mast::tip::top::at_joint);
-    let moving = builder.subscribe(mast::estimator::base::moving);
-    let scaled = builder.subscribe(mast::sensor::base::mount::mast::tip::top::imu::scaled);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Mast::builder().simulate()?;
+    let here = simulation.subscribe(mast::estimator::base::here);
+    let back = simulation.subscribe(mast::estimator::base::mount::mast::tip::top::back);
+    let at_joint = simulation.subscribe(mast::estimator::base::mount::mast::tip::top::at_joint);
+    let moving = simulation.subscribe(mast::estimator::base::moving);
+    let scaled = simulation.subscribe(mast::sensor::base::mount::mast::tip::top::imu::scaled);
     simulation.run_for(Duration::from_secs(1));
 
     let here = here.drain().last().expect("it emitted");

@@ -1,6 +1,6 @@
 //! Code that hangs until a test lets it go on, and what is waited for meanwhile.
 
-use crate::components::{Doing, lock, within};
+use crate::components::{Doing, Done, lock, within};
 use bb_core::ComponentFault;
 use bb_core::prelude::*;
 use std::collections::BTreeMap;
@@ -86,6 +86,12 @@ impl Gate {
         while state.0 == Some(place) {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
+    }
+
+    /// Passes, as code that returns nothing.
+    pub(crate) fn done(&self, place: &'static str) -> Done {
+        self.pass(place);
+        Ok(())
     }
 
     /// Code of a task that blocks its thread at a place.

@@ -12,10 +12,7 @@ fn a_sensor_an_actuator_and_a_command_that_hang_are_reported_while_the_robot_run
         HERE.pass("here");
         Ok(Reading::nothing())
     };
-    builder.options(SERVO).command = |_| {
-        HERE.pass("here");
-        Ok(())
-    };
+    builder.options(SERVO).command = |_| HERE.done("here");
     builder.options(TASK).run = |_| HERE.stuck("here");
     let faults = builder.subscribe(system::Faults);
     let running = armed(builder);

@@ -255,9 +255,8 @@ fn neither_ticks_nor_requests_count_as_runs() -> Result<(), Failure> {
         (-1.0, 100, vec![(10, HealthState::Degraded, HealthReason::Diverged)]),
         (1.0, 500, vec![(110, HealthState::Lost, HealthReason::Lost)]),
     ] {
-        let builder = Industrious::builder();
-        let health = builder.subscribe(system::Health);
-        let mut simulation = builder.simulate()?;
+        let mut simulation = Industrious::builder().simulate()?;
+        let health = simulation.subscribe(system::Health);
         simulation.publish(number, at(10), Number(first));
         while simulation.clock().now() < at(until) {
             simulation.call(busy, Ask)?;
@@ -277,9 +276,8 @@ fn neither_ticks_nor_requests_count_as_runs() -> Result<(), Failure> {
 #[test]
 fn an_estimator_that_stopped_for_good_says_so_is_lost_and_takes_no_requests() -> Result<(), StartError> {
     let busy = industrious::sensor::base::number::busy;
-    let builder = Industrious::builder();
-    let health = builder.subscribe(system::Health);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Industrious::builder().simulate()?;
+    let health = simulation.subscribe(system::Health);
     simulation.publish(industrious::sensor::base::number, at(10), Number(-20.0));
     let told = changes(&health);
     assert_eq!(told.iter().map(|(.., reason)| *reason).collect::<Vec<_>>(), [HealthReason::Stopped]);

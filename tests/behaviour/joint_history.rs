@@ -75,10 +75,9 @@ fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen()
 fn an_input_ahead_of_the_clock_costs_a_second_at_most() -> Result<(), StartError> {
     use DropReason::{ClockSkew, NoTransform, OutOfOrder};
     for (ahead, resumes) in [(900, 1_000), (1_000, 1_100), (1_001, 200)] {
-        let builder = Reach::builder();
-        let seen = builder.subscribe(reach::estimator::base::keeper);
-        let health = builder.subscribe(system::Health);
-        let mut simulation = builder.simulate()?;
+        let mut simulation = Reach::builder().simulate()?;
+        let seen = simulation.subscribe(reach::estimator::base::keeper);
+        let health = simulation.subscribe(system::Health);
         for millis in (0..1500).step_by(10) {
             simulation.publish(SHOULDER, at(millis), joint(0.0));
             simulation.publish(LIFT, at(millis), joint(0.1));

@@ -192,26 +192,6 @@ fn commands_that_drive_an_actuator_and_are_cancelled_or_time_out_do_so_again() -
 }
 
 #[test]
-fn parameters_that_are_set_and_estimators_that_are_lost_are_so_again() -> Result<(), Failure> {
-    let (heard, report) = again(|simulation| {
-        for round in 0..10 {
-            feed(simulation, round * 100..round * 100 + 20);
-            // At the instant of a tick too, and of a loss.
-            simulation.set_parameter(again::param::gain, round as f64 / 10.0)?;
-            simulation.run_until(at(round * 100 + 21));
-            simulation.set_parameter(again::param::gain, round as f64 / 5.0)?;
-            simulation.run_until(at(round * 100 + 59));
-            simulation.set_parameter(again::param::gain, 1.0)?;
-        }
-        Ok(())
-    })?;
-    assert_eq!(count(&heard, "param/gain"), 30);
-    let sum = report.estimator("sensor/base/number/sum").ok_or("it is declared")?;
-    assert!(sum.transitions >= 20, "it is lost and found each time: {}", sum.transitions);
-    Ok(())
-}
-
-#[test]
 fn panics_that_escalate_until_the_robot_is_disarmed_do_so_again() -> Result<(), Failure> {
     let (heard, report) = again(|simulation| {
         for failure in 1..=12 {
@@ -239,23 +219,6 @@ fn a_stop_with_a_command_that_runs_and_a_disarm_that_fails_is_one_again() -> Res
         Ok(())
     })?;
     assert_eq!((report.safety, count(&heard, "safety/error")), (Safety::Error, 1));
-    Ok(())
-}
-
-#[test]
-fn an_actuator_that_fails_does_so_again() -> Result<(), Failure> {
-    let (heard, report) = again(|simulation| {
-        for round in 1..5 {
-            simulation.run_until(at(round * 200));
-            assert!(simulation.actuate(again::actuator::base::pan::servo, Number(-1.0)).is_err());
-            assert!(simulation.actuate(again::actuator::base::pan::servo, Number(1.0)).is_err(), "not yet back");
-            simulation.run_until(at(round * 200 + 150));
-            simulation.actuate(again::actuator::base::pan::servo, Number(1.0))?;
-        }
-        Ok(())
-    })?;
-    assert_eq!((count(&heard, "fault"), count(&heard, "actuator/base/pan/servo")), (4, 4));
-    assert_eq!(report.all_faults, 4);
     Ok(())
 }
 

@@ -4,7 +4,7 @@ pub(crate) use crate::components::*;
 pub(crate) use crate::gate::*;
 pub(crate) use crate::plain::*;
 pub(crate) use crate::replay::{
-    Published, Random, collect, counts, entries, is_again, journal, once_more, overflow, play, read_back, same,
+    Published, Random, collect, entries, is_again, journal, once_more, overflow, play, read_back, run_again, same,
     same_again, same_from_file,
 };
 pub(crate) use bb_core::event::{CommandPhase, ParameterValue, RefusalReason};

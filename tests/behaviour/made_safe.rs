@@ -43,11 +43,9 @@ static GATE: Gate = Gate::new();
 fn alone() -> MutexGuard<'static, ()> {
     let alone = one_at_a_time();
     TURNING.store(0, Ordering::SeqCst);
-    MADE.store(0, Ordering::SeqCst);
-    FIRST.store(WORKS, Ordering::SeqCst);
-    LATER.store(WORKS, Ordering::SeqCst);
+    // `WORKS` and `SLOWLY` are zero.
+    [&MADE, &FIRST, &LATER, &BRAKES].into_iter().for_each(|number| number.store(0, Ordering::SeqCst));
     HOLDS.store(true, Ordering::SeqCst);
-    BRAKES.store(SLOWLY, Ordering::SeqCst);
     REGISTERS_FIRST.store(false, Ordering::SeqCst);
     alone
 }

@@ -93,8 +93,8 @@ impl Actuator for Drive {
 /// A command whose code panics, hangs, or does as it should.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(joint_command)]
-struct Push {
-    position: f64,
+pub(crate) struct Push {
+    pub(crate) position: f64,
 }
 
 const PANICS: f64 = -7.0;

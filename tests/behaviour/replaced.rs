@@ -134,8 +134,8 @@ fn requests_to_a_replaced_estimator_are_refused_and_do_not_fail_it() -> Result<(
     let mut simulation = builder.simulate()?;
     let refused = "sensor/base/count/asked is replaced, and its replacement takes no requests";
     let asked = bench::sensor::base::count::asked;
-    assert_eq!(simulation.call(asked, Ask).expect_err("it is replaced").to_string(), refused);
-    assert_eq!(simulation.cast(asked, Number(1.0)).expect_err("it is replaced").to_string(), refused);
+    assert_refused(simulation.call(asked, Ask), refused);
+    assert_refused(simulation.cast(asked, Number(1.0)), refused);
     simulation.run_until(at(15));
     assert_eq!(numbers(&asked_numbers), [0.0, 5.0]);
     simulation.stop().ok()?;

@@ -121,7 +121,7 @@ pub(crate) fn same_again<R: Robot>(
     builder: impl Fn() -> Builder<R>,
     run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
 ) -> Result<(Published, Report), Failure> {
-    run_again(builder, run, Ok)
+    run_again(builder(), builder, run, Ok)
 }
 
 /// Runs a robot, and once more from what a file would hold of its journal: all that is published and counted is the same.
@@ -129,15 +129,16 @@ pub(crate) fn same_from_file<R: Robot>(
     builder: impl Fn() -> Builder<R>,
     run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
 ) -> Result<(Published, Report), Failure> {
-    run_again(builder, run, |entries| read_back::<R>(&entries))
+    run_again(builder(), builder, run, |entries| read_back::<R>(&entries))
 }
 
-fn run_again<R: Robot>(
-    builder: impl Fn() -> Builder<R>,
+/// Runs a robot, and once more by another builder from what is kept of its journal.
+pub(crate) fn run_again<R: Robot>(
+    mut first_builder: Builder<R>,
+    builder: impl FnOnce() -> Builder<R>,
     run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
     keep: impl FnOnce(Vec<Entry>) -> Result<Vec<Entry>, Failure>,
 ) -> Result<(Published, Report), Failure> {
-    let mut first_builder = builder();
     let lines = journal(&mut first_builder);
     let all = first_builder.subscribe_any(Select::All, None, overflow());
     let report = run(first_builder)?;

@@ -34,10 +34,7 @@ fn set_speed(_: f64) -> Done {
 
 /// A disarm callback takes as long as the gate is closed.
 fn brake(context: &SensorContext) -> Done {
-    context.on_disarm(|| {
-        GATE.pass("brake");
-        Ok(())
-    });
+    context.on_disarm(|| GATE.done("brake"));
     Ok(())
 }
 

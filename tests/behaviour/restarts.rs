@@ -37,11 +37,10 @@ robot! {
 #[test]
 fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notices() -> Result<(), StartError> {
     let _alone = one_at_a_time();
-    let builder = Workshop::builder();
-    let health = builder.subscribe(system::Health);
-    let pose = builder.subscribe(workshop::sensor::base::plugged::pose);
-    let tally = builder.subscribe(workshop::sensor::base::beside::tally);
-    let mut simulation = armed_simulation(builder);
+    let mut simulation = armed_simulation(Workshop::builder());
+    let health = simulation.subscribe(system::Health);
+    let pose = simulation.subscribe(workshop::sensor::base::plugged::pose);
+    let tally = simulation.subscribe(workshop::sensor::base::beside::tally);
     simulation.run_until(at(5005));
     let changes = health.drain().map(|change| (change.estimator, change.from, change.to, change.time));
     // The last good reading was at 490 ms. After backoffs of 10 to 640 ms, and one of a second, it reads again at 2770 ms.
@@ -76,10 +75,9 @@ fn startled() -> Option<MonotonicTime> {
 fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     let _alone = one_at_a_time();
     STARTLES.store(2, Ordering::SeqCst);
-    let builder = Workshop::builder();
-    let startled = builder.subscribe(workshop::sensor::base::startled);
-    let beside = builder.subscribe(workshop::sensor::base::beside);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Workshop::builder().simulate()?;
+    let startled = simulation.subscribe(workshop::sensor::base::startled);
+    let beside = simulation.subscribe(workshop::sensor::base::beside);
     simulation.run_until(at(195));
     assert_eq!(beside.drain().count(), 20, "the other one is read from the start");
     // After backoffs of 10 ms and 20 ms.
@@ -183,9 +181,8 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
     let _alone = one_at_a_time();
     NUMBER.store(0, Ordering::SeqCst);
     lock(&LOG).clear();
-    let builder = Single::builder();
-    let last = builder.subscribe(single::sensor::base::numbers::only);
-    let mut simulation = armed_simulation(builder);
+    let mut simulation = armed_simulation(Single::builder());
+    let last = simulation.subscribe(single::sensor::base::numbers::only);
     simulation.run_until(at(55));
     simulation.set_parameter(single::param::gain, 2.0).expect("it is finite");
     simulation.run_until(at(154));
@@ -215,9 +212,8 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
 #[test]
 fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
     let _alone = one_at_a_time();
-    let builder = Single::builder();
-    let last = builder.subscribe(single::sensor::base::numbers::only);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Single::builder().simulate()?;
+    let last = simulation.subscribe(single::sensor::base::numbers::only);
     lock(&LOG).clear();
     // A panic ends the instance without a word; too many in its link restart what is there, but for what is below its joint.
     for panic in 1..=4 {
@@ -260,9 +256,8 @@ fn fail(_: &mut f64, number: f64) -> Replied {
 #[test]
 fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_after_it() -> Result<(), StartError> {
     let _alone = one_at_a_time();
-    let builder = Workshop::builder();
-    let near = builder.subscribe(workshop::sensor::base::near::near);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Workshop::builder().simulate()?;
+    let near = simulation.subscribe(workshop::sensor::base::near::near);
     simulation.publish(workshop::sensor::base::near, at(100), Number(-1.0));
     for number in 1..=9 {
         simulation.publish(workshop::sensor::base::near, at(100 + number), Number(number as f64));
@@ -299,9 +294,8 @@ fn messages_that_wait_for_a_worker_outlast_its_failure() {
 #[test]
 fn one_stamp_far_ahead_does_not_outlast_a_restart() -> Result<(), StartError> {
     let _alone = one_at_a_time();
-    let builder = Workshop::builder();
-    let near = builder.subscribe(workshop::sensor::base::near::near);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Workshop::builder().simulate()?;
+    let near = simulation.subscribe(workshop::sensor::base::near::near);
     simulation.run_until(at(100));
     let live = simulation.live();
     // Less than a second ahead of the clock, so that it is let in; the next ones are out of order.

@@ -25,10 +25,9 @@ robot! {
 
 #[test]
 fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() -> Result<(), StartError> {
-    let builder = Clockwork::builder();
-    let slow = builder.subscribe(clockwork::sensor::base::slow);
-    let rated = builder.subscribe(clockwork::sensor::base::rated);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Clockwork::builder().simulate()?;
+    let slow = simulation.subscribe(clockwork::sensor::base::slow);
+    let rated = simulation.subscribe(clockwork::sensor::base::rated);
     simulation.run_for(Duration::from_millis(495));
     assert_eq!(simulation.clock().now(), at(495));
     assert_eq!(rated.drain().count(), 50);
@@ -58,9 +57,8 @@ fn a_sensor_that_stops_virtual_time_is_stopped_and_named() -> Result<(), StartEr
 
 #[test]
 fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() -> Result<(), StartError> {
-    let builder = Clockwork::builder();
-    let rated = builder.subscribe(clockwork::sensor::base::rated);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Clockwork::builder().simulate()?;
+    let rated = simulation.subscribe(clockwork::sensor::base::rated);
     simulation.run_for(Duration::from_millis(5));
     simulation.publish(clockwork::sensor::base::fed, at(35), Number(0.0));
     simulation.run_until(at(60));
@@ -71,9 +69,8 @@ fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() -> Result<(), St
 
 #[test]
 fn of_sensors_due_at_once_the_driver_is_read_last() -> Result<(), StartError> {
-    let builder = Clockwork::builder();
-    let both = builder.subscribe(clockwork::estimator::base::both);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = Clockwork::builder().simulate()?;
+    let both = simulation.subscribe(clockwork::estimator::base::both);
     simulation.run_to_end();
     assert_eq!(both.drain().filter(|seen| seen.driver == seen.second).count(), 10);
     Ok(())

@@ -166,14 +166,7 @@ fn another_controller_takes_the_place_of_a_declared_one() -> Result<(), Failure>
     assert_eq!(world.joint("spin", simulation.clock().now())?.point.velocity, -0.5);
 
     let mut builder = simulated()?;
-    let threshold = bb_estimators::motion::ThresholdControllerOptions {
-        measurement: "sensor/base/spin/encoder",
-        actuator: "actuator/base/spin/motor",
-        on_at: 1.0,
-        off_at: 0.0,
-        on_velocity: 1.0,
-        off_velocity: 0.0,
-    };
+    let threshold = bb_estimators::motion::ThresholdControllerOptions::defaults();
     builder.replace_service::<ThresholdController>("controller/hold", threshold)?;
     let says = "controller/hold cannot start: its replacement publishes `ThresholdState`, and what is declared publishes `PidState`";
     assert_refused(builder.simulate(), says);

@@ -55,36 +55,45 @@ fn commands_beyond_a_limit_are_brought_back_and_counted_and_each_bound_is_allowe
 fn a_trajectory_beyond_a_limit_is_refused() -> Result<(), Failure> {
     let simulation = ready()?;
     let motor = crane::actuator::base::slew::motor;
-    let point = |position: f64, velocity: f64, millis: u64| bb_core::payload::TrajectoryPoint {
-        positions: vec![position],
+    let point = |positions: &[f64], velocity: f64, millis: u64| bb_core::payload::TrajectoryPoint {
+        positions: positions.to_vec(),
         velocities: vec![velocity],
         time_from_start: Duration::from_millis(millis),
         ..Default::default()
     };
-    let trajectory =
-        |points: Vec<_>| JointTrajectory { joint_names: ["slew".to_owned()].into(), points: points.into() };
-    let far = trajectory(vec![point(0.0, 0.0, 0), point(2.0, 0.0, 5000)]);
-    let error = simulation.actuate(motor, far.into()).expect_err("it is beyond");
-    let expected = format!("the position 2 is beyond the limit {} of the joint", 90_f64.to_radians());
-    assert_eq!(error, ActuatorError::OutOfBounds(expected));
-    let fast = trajectory(vec![point(0.0, 0.0, 0), point(0.5, -1.5, 500), point(1.0, 0.0, 5000)]);
-    assert_refused(simulation.actuate(motor, fast.into()), "the velocity -1.5 is beyond the limit -1 of the joint");
-    // Nor is there a way around the limits.
-    let jump = trajectory(vec![point(0.0, 0.0, 0), point(1.0, 0.0, 500)]);
-    assert_refused(simulation.actuate(motor, jump.into()), "the velocity 2 is beyond the limit 1 of the joint");
-    let mut twice = trajectory(vec![point(0.0, 0.0, 0), point(0.5, 0.0, 5000)]);
-    twice.joint_names = ["slew".to_owned(), "slew".to_owned()].into();
-    twice.points = twice
-        .points
-        .iter()
-        .map(|point| bb_core::payload::TrajectoryPoint { positions: vec![0.0, -2.0], ..point.clone() })
-        .collect();
-    let error = simulation.actuate(motor, twice.into()).expect_err("its second column is beyond").to_string();
-    assert_eq!(error, format!("the position -2 is beyond the limit {} of the joint", -90_f64.to_radians()));
-    let other =
-        JointTrajectory { joint_names: ["reach".to_owned()].into(), ..trajectory(vec![point(0.0, 0.0, 0)]) };
-    let error = simulation.actuate(motor, other.into()).expect_err("it is not named").to_string();
-    assert_eq!(error, "the actuator failed: the trajectory does not name the joint `slew`");
+    let quarter = 90_f64.to_radians();
+    for (joints, points, says) in [
+        (
+            &["slew"][..],
+            vec![point(&[0.0], 0.0, 0), point(&[2.0], 0.0, 5000)],
+            format!("the position 2 is beyond the limit {quarter} of the joint"),
+        ),
+        (
+            &["slew"],
+            vec![point(&[0.0], 0.0, 0), point(&[0.5], -1.5, 500), point(&[1.0], 0.0, 5000)],
+            "the velocity -1.5 is beyond the limit -1 of the joint".into(),
+        ),
+        // Nor is there a way around the limits.
+        (
+            &["slew"],
+            vec![point(&[0.0], 0.0, 0), point(&[1.0], 0.0, 500)],
+            "the velocity 2 is beyond the limit 1 of the joint".into(),
+        ),
+        (
+            &["slew", "slew"],
+            vec![point(&[0.0, -2.0], 0.0, 0), point(&[0.0, -2.0], 0.0, 5000)],
+            format!("the position -2 is beyond the limit {} of the joint", -quarter),
+        ),
+        (
+            &["reach"],
+            vec![point(&[0.0], 0.0, 0)],
+            "the actuator failed: the trajectory does not name the joint `slew`".into(),
+        ),
+    ] {
+        let joint_names = joints.iter().map(|joint| (*joint).to_owned()).collect();
+        let trajectory = JointTrajectory { joint_names, points: points.into() };
+        assert_refused(simulation.actuate(motor, trajectory.into()), &says);
+    }
     let report = simulation.report();
     let counts = report.actuator(motor.path()).ok_or("it is declared")?;
     let refused = LimitedQuantity::ALL.iter().map(|quantity| counts.refused(*quantity));

@@ -1,9 +1,9 @@
 //! Actuators that speak of the motor behind a transmission: the runtime converts for them, and for them alone.
 
 use super::*;
+use crate::motion_ends::Push;
 use bb_core::payload::{BeginMotion, JointTrajectory, TrajectoryPoint};
 use bb_core::topology::{Limit, Transmission};
-use bb_core::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 use std::collections::HashMap;
 
 const GEAR: Transmission = Transmission { reduction: 100.0, offset: 0.5, is_reversed: true };
@@ -77,29 +77,19 @@ impl Sensor for ShaftEncoder {
     }
 }
 
-/// A command that says nothing of motors.
-#[derive(Clone, Copy, Debug, Payload)]
-#[payload(joint_command)]
-struct Grip(f64);
-
-impl JointCommand for Grip {
-    fn limit(&mut self, _: &JointBounds) -> Result<Exceeded, OutOfBounds> {
-        Ok(Exceeded::default())
-    }
-}
-
+/// Takes a command that says nothing of motors.
 struct Gripper;
 
 impl Actuator for Gripper {
     type Options = NoOptions;
-    type Command = Grip;
+    type Command = Push;
     const SIDE: JointSide = JointSide::Motor;
 
     fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
         Ok(Self)
     }
 
-    fn handle_command(&mut self, _: &Stamped<Grip>) -> Result<(), Fault> {
+    fn handle_command(&mut self, _: &Stamped<Push>) -> Result<(), Fault> {
         Ok(())
     }
 
@@ -249,10 +239,8 @@ fn without_a_transmission_the_motor_is_the_joint_to_the_bit() -> Result<(), Fail
     let Shaft { commanded, limit, .. } = shaft(&shafts, "wrist");
     assert_eq!(commanded, commands());
     let limit = limit.ok_or("it is declared")?;
-    assert_eq!(
-        (limit.lower, limit.upper, limit.velocity, limit.effort),
-        (Some(-1.0), Some(2.0), Some(2.0), Some(5.0))
-    );
+    let limits = [limit.lower, limit.upper, limit.velocity, limit.effort];
+    assert_eq!(limits, [-1.0, 2.0, 2.0, 5.0].map(Some));
     assert_eq!(simulation.joints().status("wrist").ok_or("it is known")?.position[0], 1.25);
     Ok(())
 }
@@ -275,8 +263,8 @@ fn a_simulated_joint_takes_the_place_of_a_motor() -> Result<(), Failure> {
 fn a_command_that_says_nothing_of_motors_is_refused_at_a_transmission() -> Result<(), Failure> {
     let (simulation, _) = armed()?;
     let grip = geared::actuator::base::arm::hand::wrist::palm::finger::grip;
-    let says = "the command could not be converted to the motor of the joint: `Grip` does not define `JointCommand::at_motor`";
-    assert_refused(simulation.actuate(grip, Grip(1.0)), says);
+    let says = "the command could not be converted to the motor of the joint: `Push` does not define `JointCommand::at_motor`";
+    assert_refused(simulation.actuate(grip, Push { position: 1.0 }), says);
     Ok(())
 }
 

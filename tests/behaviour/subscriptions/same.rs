@@ -115,24 +115,25 @@ fn check(early: &[DynamicSubscription], late: &[DynamicSubscription]) {
 }
 
 #[test]
-fn the_builder_and_the_robot_give_the_same_messages_on_virtual_time() -> Result<(), Failure> {
+fn the_builder_and_the_robot_give_the_same_messages_on_virtual_time_and_in_real_time() -> Result<(), Failure> {
+    let heard = |builder: &Builder<Whole>| {
+        listen(|select, payload| builder.subscribe_any(select, payload, Overflow::default()))
+    };
+    let heard_live =
+        |robot: &Live<Whole>| listen(|select, payload| robot.subscribe_any(select, payload, Overflow::default()));
     let builder = Whole::builder();
-    let early = listen(|select, payload| builder.subscribe_any(select, payload, Overflow::default()));
+    let early = heard(&builder);
     let mut simulation = builder.simulate()?;
-    let late = listen(|select, payload| simulation.subscribe_any(select, payload, Overflow::default()));
     let robot = simulation.live();
+    let late = heard_live(&robot);
     exercise(&robot, &mut || simulation.run_for(Duration::from_millis(1)))?;
     simulation.stop();
     check(&early, &late);
-    Ok(())
-}
 
-#[test]
-fn the_builder_and_the_robot_give_the_same_messages_in_real_time() -> Result<(), Failure> {
     let builder = Whole::builder();
-    let early = listen(|select, payload| builder.subscribe_any(select, payload, Overflow::default()));
+    let early = heard(&builder);
     let running = builder.start()?;
-    let late = listen(|select, payload| running.subscribe_any(select, payload, Overflow::default()));
+    let late = heard_live(&running);
     exercise(&running, &mut || std::thread::sleep(Duration::from_millis(1)))?;
     running.stop();
     check(&early, &late);
