@@ -72,7 +72,7 @@ fn an_estimator_that_gives_something_else_is_named_at_its_first_difference() -> 
     let thrown = || {
         let mut builder = Plain::builder();
         builder.options(ECHO).input = throw_dice;
-        builder.options(plain::sensor::base::pan::encoder::position).input = throw_dice;
+        builder.options(POSITION).input = throw_dice;
         builder
     };
     let mut builder = thrown();

@@ -11,7 +11,6 @@ const DROPPING: Duration = Duration::from_millis(40);
 /// A payload whose copies take long, and whose messages are dropped slowly.
 #[derive(Debug, Payload)]
 pub(crate) struct Large {
-    /// A number.
     x: f64,
 }
 
@@ -47,9 +46,8 @@ robot! {
 
 #[test]
 fn copies_and_drops_of_messages_are_charged_to_no_estimator() -> Result<(), Failure> {
-    let builder = Copying::builder();
-    let copies = builder.subscribe(copying::sensor::base::camera::first);
-    let running = builder.start()?;
+    let running = Copying::builder().start()?;
+    let copies = running.subscribe(copying::sensor::base::camera::first);
     // The first at the scale of the system's clock perhaps, the last by the processor's counter.
     for x in 0..5 {
         running.publish(copying::sensor::base::camera, running.clock().now(), Large { x: f64::from(x) });

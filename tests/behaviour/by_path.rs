@@ -105,8 +105,8 @@ fn result(execution: &bb_core::component::DynamicExecution) -> Option<Result<Str
 }
 
 #[test]
-fn commands_are_listed_with_what_they_take_and_give() -> Result<(), StartError> {
-    let simulation = Open::builder().simulate()?;
+fn commands_are_listed_with_what_they_take_and_give() {
+    let simulation = Open::builder().simulate().expect("it starts");
     let commands = simulation.bus().commands();
     assert_eq!(commands.iter().map(|command| command.path).collect::<Vec<_>>(), ["command/arm", "command/go"]);
     let go = &commands[1];
@@ -128,7 +128,6 @@ fn commands_are_listed_with_what_they_take_and_give() -> Result<(), StartError> 
     let default = r#""default":{"name":"","speed":0.0,"stops":[]}"#;
     assert!(schema.contains(speed) && schema.contains(default), "{schema}");
     assert!(commands[0].argument_list().is_empty());
-    Ok(())
 }
 
 #[test]
@@ -186,12 +185,12 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Failure> 
 }
 
 #[test]
-fn messages_say_which_process_they_come_from() -> Result<(), StartError> {
+fn messages_say_which_process_they_come_from() {
     let mut builder = Open::builder();
     builder.node("left_computer");
     let double = builder.subscribe(open::sensor::base::number::double);
     let all = builder.subscribe_any(Select::All, None, Overflow::default());
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     simulation.publish(open::sensor::base::number, at(5), Number(1.0));
     assert_eq!(simulation.arm(), Ok(()));
     simulation.bus().publisher::<Number>("radio").expect("it is free").publish(Number(1.0));
@@ -207,14 +206,13 @@ fn messages_say_which_process_they_come_from() -> Result<(), StartError> {
     }
     let other = Open::builder();
     let slow = other.subscribe(open::sensor::base::slow);
-    let mut simulation = other.simulate()?;
+    let mut simulation = other.simulate().expect("it starts");
     simulation.run_until(at(1));
     assert_eq!(slow.try_recv().map(|number| number.origin.node), Some("local"));
-    Ok(())
 }
 
 #[test]
-fn handlers_of_telemetry_get_every_event_and_may_panic() -> Result<(), StartError> {
+fn handlers_of_telemetry_get_every_event_and_may_panic() {
     let mut builder = Open::builder();
     builder.supervision().first_backoff = Duration::from_millis(1);
     let told: Arc<Mutex<Vec<TelemetryEvent>>> = Arc::default();
@@ -224,7 +222,7 @@ fn handlers_of_telemetry_get_every_event_and_may_panic() -> Result<(), StartErro
         assert_eq!(robot, "Open");
         lock(&seen).push(event.clone());
     });
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     for (millis, number) in [(10, 1.0), (20, f64::NAN), (30, -1.0), (40, 2.0)] {
         simulation.publish(open::sensor::base::number, at(millis), Number(number));
     }
@@ -244,7 +242,6 @@ fn handlers_of_telemetry_get_every_event_and_may_panic() -> Result<(), StartErro
     let degrades =
         |event: &TelemetryEvent| matches!(event, TelemetryEvent::Transition(change) if change.estimator == DOUBLE);
     assert!(count(degrades) >= 1);
-    Ok(())
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use bb_core::payload::ActuatorCommand;
 use bb_core::prelude::*;
-use bb_core::{Builder, JointPositions, JointReading, Report, RequestCodec, Robot, Running};
+use bb_core::{Builder, HealthTransition, JointPositions, JointReading, Report, RequestCodec, Robot, Running};
 use std::fmt::{Debug, Display, Formatter};
 use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -426,15 +426,10 @@ impl Estimator for Scale {
 /// Inputs that [`Snapshot`] received: the numbers, and which were new. NaN would be dropped, so what is missing is -1.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Seen {
-    /// The driver's number.
     pub(crate) driver: f64,
-    /// The second number.
     pub(crate) second: f64,
-    /// `true` if the second number was new.
     pub(crate) second_is_new: bool,
-    /// The number that need not be there.
     pub(crate) third: f64,
-    /// `true` if the third number was new.
     pub(crate) third_is_new: bool,
 }
 
@@ -532,6 +527,11 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The changes of health that wait in a subscription, with their reasons.
+pub(crate) fn changes_of(health: &Subscription<HealthTransition>) -> Vec<(HealthState, HealthReason)> {
+    health.drain().map(|change| (change.to, change.reason)).collect()
+}
+
 /// The numbers that wait in a subscription.
 pub(crate) fn numbers(subscription: &Subscription<Number>) -> Vec<f64> {
     subscription.drain().map(|number| number.0).collect()
@@ -612,15 +612,6 @@ pub(crate) fn check_steps<R: Robot>(
             publish(simulation, sensor, millis.parse().expect("milliseconds"));
         }
         assert_eq!(seen(simulation).join(", "), expected, "{row}: {step}");
-    }
-}
-
-/// Runs tests that wait most of their time on a thread each.
-pub(crate) fn side_by_side<const N: usize>(tests: [fn(); N]) {
-    for thread in tests.map(std::thread::spawn) {
-        if let Err(panic) = thread.join() {
-            std::panic::resume_unwind(panic);
-        }
     }
 }
 

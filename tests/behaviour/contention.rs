@@ -131,9 +131,8 @@ fn every_lost_message_is_counted_whatever_publishes_or_fails() {
 #[test]
 fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
     alone_within(60, || {
-        let builder = Crowded::builder();
-        let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
-        let running = builder.start().expect("it starts");
+        let running = Crowded::builder().start().expect("it starts");
+        let mut ordered = running.subscribe(crowded::estimator::base::ordered);
         let (live, answers) = ((*running).clone(), Arc::new(Mutex::new(Vec::new())));
         let said = Arc::clone(&answers);
         let taps: Mutex<Vec<DynamicSubscription>> = Mutex::default();
@@ -160,10 +159,9 @@ fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
 #[test]
 fn a_waker_that_panics_harms_nobody() {
     alone_within(60, || {
-        let builder = Crowded::builder();
-        let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
-        let behind = builder.subscribe(crowded::estimator::base::behind);
-        let running = builder.start().expect("it starts");
+        let running = Crowded::builder().start().expect("it starts");
+        let mut ordered = running.subscribe(crowded::estimator::base::ordered);
+        let behind = running.subscribe(crowded::estimator::base::behind);
         let mut safety = running.subscribe(system::SafetyState);
         when_woken(&mut ordered, || panic!("a waker of a subscriber"));
         when_woken(&mut safety, || panic!("one that a thread of the pool wakes"));

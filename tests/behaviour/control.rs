@@ -268,9 +268,9 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failu
 }
 
 #[test]
-fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Failure> {
+fn controllers_and_bridges_run_and_reach_everything_by_path() {
     let _alone = alone();
-    let mut simulation = Commanded::builder().simulate()?;
+    let mut simulation = Commanded::builder().simulate().expect("it starts");
     let follow = simulation.subscribe(commanded::controller::follow);
     let counts = simulation.subscribe(commanded::bridge::dashboard);
     simulation.run_until(at(150));
@@ -278,5 +278,4 @@ fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Fail
     simulation.run_until(at(350));
     assert_eq!(numbers(&follow), [0.0, 0.0, 1.0, 1.0]);
     assert_eq!(numbers(&counts), [1.0, 10.0, 10.0, 10.0]);
-    Ok(())
 }

@@ -21,18 +21,16 @@ robot! {
 }
 
 #[test]
-fn an_estimator_is_not_lost_because_the_robot_stops() -> Result<(), StartError> {
-    let builder = Braking::builder();
-    let health = builder.subscribe(system::Health);
-    let running = builder.start()?;
+fn an_estimator_is_not_lost_because_the_robot_stops() {
+    let running = Braking::builder().start().expect("it starts");
+    let health = running.subscribe(system::Health);
     // Its only message, right before the stop, which takes longer than `lost_after`.
     running.publish(braking::sensor::base::number, running.clock().now(), Number(1.0));
     let report = running.stop();
-    let changes: Vec<_> = health.drain().map(|change| (change.to, change.reason)).collect();
+    let changes: Vec<_> = changes_of(&health);
     assert!(changes.is_empty(), "{changes:?}");
     let refused: u64 = report.commands.iter().map(|command| command.refused).sum();
     assert_eq!(refused, 0);
-    Ok(())
 }
 
 fn ending() -> Builder<Plain> {

@@ -96,15 +96,7 @@ fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
 }
 
 #[test]
-fn callbacks_that_hang_are_waited_for_within_limits() {
-    side_by_side([
-        a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them,
-        an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiting_for_its_lock,
-        a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return,
-    ]);
-}
-
-fn a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them() {
+fn a_robot_that_is_disarmed_while_callbacks_hang_waits_for_them() {
     let rig = &RIGS[DISARMS];
     within(60, move || {
         rig.gate.close("here");
@@ -123,6 +115,7 @@ fn a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them() {
     });
 }
 
+#[test]
 fn an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiting_for_its_lock() {
     let rig = &RIGS[LOCKS];
     within(60, move || {
@@ -148,6 +141,7 @@ fn an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiti
     });
 }
 
+#[test]
 fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() {
     let rig = &RIGS[DIES];
     within(120, move || {

@@ -79,7 +79,7 @@ fn what_a_dispatch_sees() -> Result<(), StartError> {
 const SNAPSHOT: &str = "estimator/base/snapshot";
 
 #[test]
-fn a_dropped_dispatch_reaches_handlers_of_telemetry() -> Result<(), StartError> {
+fn a_dropped_dispatch_reaches_handlers_of_telemetry() {
     let told: Arc<Mutex<Vec<TelemetryEvent>>> = Arc::default();
     let mut builder = FanIn::builder();
     let tell = Arc::clone(&told);
@@ -90,7 +90,7 @@ fn a_dropped_dispatch_reaches_handlers_of_telemetry() -> Result<(), StartError> 
             lock(&tell).push(event.clone());
         }
     });
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     let dropped = |input| TelemetryEvent::Dropped { estimator: SNAPSHOT, input, reason: "sync miss" };
     simulation.publish(fan_in::sensor::base::a, at(0), Number(1.0));
     assert_eq!(std::mem::take(&mut *lock(&told)), [dropped("second")], "it is missing");
@@ -103,7 +103,6 @@ fn a_dropped_dispatch_reaches_handlers_of_telemetry() -> Result<(), StartError> 
     assert_eq!(std::mem::take(&mut *lock(&told)), [ran()], "each run is told of");
     simulation.publish(fan_in::sensor::base::a, at(12), Number(1.0));
     assert_eq!(std::mem::take(&mut *lock(&told)), [dropped("second")], "it is too old");
-    Ok(())
 }
 
 #[test]
@@ -143,17 +142,16 @@ fn skewed(reading: u32, now: MonotonicTime) -> Read {
 }
 
 #[test]
-fn a_stamp_from_the_future_is_dropped_and_does_not_disable_the_input() -> Result<(), StartError> {
+fn a_stamp_from_the_future_is_dropped_and_does_not_disable_the_input() {
     let mut builder = Plain::builder();
     builder.options(SOURCE).read = skewed;
     let behind = builder.subscribe(BEHIND);
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     simulation.run_until(at(35));
     assert_eq!(numbers(&behind), [1.0, 3.0, 4.0]);
     let report = simulation.report();
     let input = &report.estimator("sensor/base/source/behind").expect("it is declared").inputs[0];
     assert_eq!(input.dropped(DropReason::ClockSkew), 1);
-    Ok(())
 }
 
 robot! {
@@ -176,11 +174,10 @@ robot! {
 }
 
 #[test]
-fn what_is_derived_from_a_message_arrives_before_those_that_take_both() -> Result<(), StartError> {
-    let mut simulation = Diamond::builder().simulate()?;
+fn what_is_derived_from_a_message_arrives_before_those_that_take_both() {
+    let mut simulation = Diamond::builder().simulate().expect("it starts");
     let both = simulation.subscribe(diamond::estimator::base::both);
     simulation.run_to_end();
     let seen: Vec<_> = both.drain().map(|seen| (seen.driver, seen.second, seen.third, seen.third_is_new)).collect();
     assert_eq!(seen, [0.0, 1.0, 2.0, 3.0, 4.0].map(|number| (number, 10.0 * number, number, true)));
-    Ok(())
 }

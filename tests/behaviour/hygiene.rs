@@ -1,7 +1,7 @@
 //! Names of the user's that the expansion must not capture, and names that are keywords.
 
 use crate::components::{Counter, Number};
-use bb_core::prelude::{Context, Estimator, Fault, Input, Inputs, NoOptions, Payload, Reply, StartError, robot};
+use bb_core::prelude::{Context, Estimator, Fault, Input, Inputs, NoOptions, Payload, Reply, robot};
 
 // The expansion has items of the same purposes beside the options that the user writes.
 #[allow(dead_code)]
@@ -64,7 +64,7 @@ robot! {
 }
 
 #[test]
-fn values_of_options_are_the_users() -> Result<(), StartError> {
+fn values_of_options_are_the_users() {
     let builder = Robot::builder();
     let counts = [
         builder.subscribe(robot::sensor::base::a),
@@ -74,10 +74,9 @@ fn values_of_options_are_the_users() -> Result<(), StartError> {
     let distance = builder.subscribe(robot::estimator::base::distance);
     let far = builder.subscribe(robot::sensor::base::mount::r#loop::r#mod);
     assert_eq!(far.path(), "sensor/base/mount/loop/mod");
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     simulation.run_to_end();
     assert_eq!(counts.map(|numbers| numbers.drain().count()), [3, 4, 2]);
     assert_eq!(distance.try_recv().map(|distance| distance.number), Some(5.0));
     assert_eq!(far.try_recv().map(|number| number.frame.name()), Some("loop"));
-    Ok(())
 }

@@ -159,8 +159,8 @@ fn states(names: &[&str], positions: &[f64]) -> JointStates {
 }
 
 #[test]
-fn a_transform_is_that_of_the_time_of_the_message() -> Result<(), StartError> {
-    let mut simulation = Reach::builder().simulate()?;
+fn a_transform_is_that_of_the_time_of_the_message() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     let spots = simulation.subscribe(reach::estimator::base::spot);
     simulation.publish(SHOULDER, at(0), joint(0.0));
     simulation.publish(LIFT, at(0), moving(1.0, 0.5));
@@ -177,12 +177,11 @@ fn a_transform_is_that_of_the_time_of_the_message() -> Result<(), StartError> {
     assert_eq!((spots[0].monotonic_time, spots[0].frame.name()), (at(5), "base"));
     assert!((spots[1].at - Vector3::new(0.0, 1.5, 0.0)).norm() < 1e-12, "{:?}", spots[1]);
     assert_eq!(spots.len(), 2);
-    Ok(())
 }
 
 #[test]
-fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(), StartError> {
-    let mut simulation = Reach::builder().simulate()?;
+fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     let spots = simulation.subscribe(reach::estimator::base::spot);
     let health = simulation.subscribe(system::Health);
     simulation.publish(CAMERA, at(1), Pixel(1.0));
@@ -215,14 +214,12 @@ fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(
     simulation.publish(LIFT, at(104), joint(1.0));
     simulation.publish(CAMERA, at(105), Pixel(1.0));
     simulation.publish(CAMERA, at(106), Pixel(1.0));
-    let changes: Vec<_> = health.drain().map(|change| (change.to, change.reason)).collect();
-    assert_eq!(changes, [(HealthState::Healthy, HealthReason::Recovered)]);
-    Ok(())
+    assert_eq!(changes_of(&health), [(HealthState::Healthy, HealthReason::Recovered)]);
 }
 
 #[test]
-fn an_optional_input_gets_the_reason_for_a_missing_transform() -> Result<(), StartError> {
-    let mut simulation = Reach::builder().simulate()?;
+fn an_optional_input_gets_the_reason_for_a_missing_transform() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     let received = simulation.subscribe(reach::estimator::base::fusion);
     let imu = reach::sensor::base::imu;
     let next = |simulation: &mut Simulation<Reach>, ms| {
@@ -244,7 +241,6 @@ fn an_optional_input_gets_the_reason_for_a_missing_transform() -> Result<(), Sta
     assert_eq!(next(&mut simulation, 26), some(old, None));
     // An input that depends on no frame spans joints as it likes.
     assert_eq!(simulation.report().estimator("estimator/base/watch").map(|watch| watch.emitted), Some(1));
-    Ok(())
 }
 
 #[test]
@@ -288,8 +284,8 @@ fn any_frame_can_be_looked_up_at_any_time() -> Result<(), Failure> {
 }
 
 #[test]
-fn a_motor_is_seen_through_its_transmission() -> Result<(), Failure> {
-    let mut simulation = Reach::builder().simulate()?;
+fn a_motor_is_seen_through_its_transmission() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     simulation.publish(MOTOR, at(0), MotorState { position: 5.0, velocity: Some(10.0), effort: Some(0.2) });
     let shoulder = simulation.joints().status("shoulder").expect("it is declared");
     assert_eq!(shoulder.time, Some(at(0)));
@@ -298,7 +294,6 @@ fn a_motor_is_seen_through_its_transmission() -> Result<(), Failure> {
     // A joint-side encoder needs none.
     simulation.publish(SHOULDER, at(1), joint(0.25));
     assert_eq!(simulation.joints().status("shoulder").map(|shoulder| shoulder.position), Some(vec![0.25]));
-    Ok(())
 }
 
 /// States at a path of one's own below `sensor` are kept as those of declared sensors, also in a replay.
@@ -329,8 +324,8 @@ fn states_at_a_path_of_ones_own_below_sensor_are_kept() -> Result<(), Failure> {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_counted() -> Result<(), StartError> {
-    let mut simulation = Reach::builder().simulate()?;
+fn what_does_not_fit_is_refused_and_counted() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     simulation.run_until(at(5000));
     for (millis, names, positions) in [
         // By name and by path; mimic joints are not named.
@@ -360,12 +355,11 @@ fn what_does_not_fit_is_refused_and_counted() -> Result<(), StartError> {
     assert!(text.contains("2 states of `wrist`, which is no moving joint of this robot"), "{text}");
     assert!(text.contains("joint lift: 2 states, 1 refused: non-finite"), "{text}");
     assert_eq!(reasons("shoulder")[..4], [2, 1, 1, 0], "{text}");
-    Ok(())
 }
 
 #[test]
-fn a_joint_that_falls_silent_is_stale() -> Result<(), StartError> {
-    let mut simulation = Reach::builder().simulate()?;
+fn a_joint_that_falls_silent_is_stale() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     let joints = simulation.joints();
     let unknown = joints.status("counter").expect("it moves");
     assert_eq!((unknown.time, unknown.is_stale, unknown.position.len()), (None, true, 0));
@@ -379,12 +373,11 @@ fn a_joint_that_falls_silent_is_stale() -> Result<(), StartError> {
     assert_eq!((counter.time, counter.position, counter.velocity), (Some(at(0)), vec![-0.4], vec![-0.25]));
     assert!(joints.status("plate").is_none(), "it does not move");
     assert_eq!(joints.all().iter().map(|joint| joint.joint).collect::<Vec<_>>(), ["shoulder", "lift", "counter"]);
-    Ok(())
 }
 
 #[test]
-fn all_joints_are_published_as_a_whole() -> Result<(), StartError> {
-    let mut simulation = Reach::builder().simulate()?;
+fn all_joints_are_published_as_a_whole() {
+    let mut simulation = Reach::builder().simulate().expect("it starts");
     let published = simulation.subscribe(reach::bridge::joint_states);
     simulation.publish(LIFT, at(1), moving(1.0, 1.0));
     simulation.publish(LIFT, at(9), moving(1.8, 1.0));
@@ -404,7 +397,6 @@ fn all_joints_are_published_as_a_whole() -> Result<(), StartError> {
     let last = published.drain().last().expect("it was published");
     assert_eq!((&last.names[..], last.monotonic_time), (&["lift".to_owned(), "counter".to_owned()][..], at(151)));
     assert_eq!(simulation.report().joints.iter().filter(|joint| !joint.is_declared).count(), 0);
-    Ok(())
 }
 
 #[test]

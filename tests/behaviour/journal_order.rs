@@ -126,21 +126,6 @@ fn a_panic_downstream_that_restarts_what_is_upstream_in_the_middle_of_its_work()
 }
 
 #[test]
-fn messages_that_wait_for_a_worker_as_the_robot_stops() -> Result<(), Failure> {
-    let (_, report) = same_again(cascade(3), |builder| {
-        let running = builder.start()?;
-        for number in 0..200 {
-            let number = Number(10.0 + f64::from(number));
-            running.publish(cascade::sensor::base::shoulder::arm::number, running.clock().now(), number);
-        }
-        Ok(running.stop())
-    })?;
-    let below = report.estimator("estimator/base/shoulder/arm/below").ok_or("it is declared")?;
-    assert!(below.emitted < 400, "some were not processed: {}", below.emitted);
-    Ok(())
-}
-
-#[test]
 fn one_of_several_callbacks_of_a_message_that_overruns() -> Result<(), Failure> {
     let overrunning = ["sensor/base/number/first", "estimator/base/late"];
     let (heard, _) = same_again(Budgeted::builder, |builder| {

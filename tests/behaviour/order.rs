@@ -14,34 +14,31 @@ fn is_prepared(kept: &mut f64, _: u32) -> Replied {
     Ok(Reply::none())
 }
 
-robot! {
-    robot Orderly;
-    parameters { gain: f64 = 1.0; }
-    commands { arm: Arm; disarm: Disarm; }
-    link base {
-        joint pan: continuous {
-            axis: z;
-            sensor encoder: External<Number>() { estimator position: Echo(init = prepare, go_on = is_prepared, input = |kept, _| Ok(Reply::emit(Number(*kept)))); }
-            // Notes what it is told, in order.
-            actuator motor: Servo(command = |number| {
-                lock(&DONE).push(number);
-                Ok(())
-            });
-            link head { }
-        }
-        sensor eager: Source(read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 1 kHz; estimator prepared: Echo(init = prepare, go_on = is_prepared, input = |kept, _| Ok(Reply::emit(Number(*kept)))); }
-        estimator apart: Echo(init = prepare, go_on = is_prepared, input = |kept, _| Ok(Reply::emit(Number(*kept)))) { input number: sensor::base::eager; runs_on: worker; }
+/// A robot whose estimators emit what they have prepared, and whose actuator notes what it is told, in order.
+fn orderly() -> Builder<Plain> {
+    let mut builder = Plain::builder();
+    builder.options(SOURCE).read = |_, _| Ok(Reading::now(Number(1.0)));
+    for estimator in [BEHIND, POSITION, APART] {
+        let echo = builder.options(estimator);
+        (echo.init, echo.go_on, echo.input) =
+            (prepare, is_prepared, |kept: &mut f64, _| Ok(Reply::emit(Number(*kept))));
     }
+    builder.options(SERVO).command = |number| {
+        lock(&DONE).push(number);
+        Ok(())
+    };
+    builder
 }
 
 #[test]
 fn what_is_asked_for_in_init_comes_before_the_first_message() {
     within(120, || {
         for _ in 0..20 {
-            let builder = Orderly::builder();
-            let near = builder.subscribe(orderly::sensor::base::eager::prepared);
-            let apart = builder.subscribe(orderly::estimator::base::apart);
+            let builder = orderly();
+            let near = builder.subscribe(BEHIND);
+            let apart = builder.subscribe(APART);
             let running = builder.start().expect("it starts");
+            running.publish(NUMBER, running.clock().now(), Number(2.0));
             for prepared in [near, apart] {
                 assert_eq!(prepared.recv_timeout(PATIENCE).map(|number| number.0), Some(1.0));
             }
@@ -53,17 +50,16 @@ fn what_is_asked_for_in_init_comes_before_the_first_message() {
 #[test]
 fn commands_to_an_actuator_are_published_in_the_order_in_which_it_carried_them_out() {
     within(60, || {
-        let running = armed(Orderly::builder());
-        let motor = orderly::actuator::base::pan::motor;
+        let running = armed(orderly());
         let room = Overflow::DropOldest { capacity: 10_000 };
-        let told = running.subscribe_any(Select::Path(motor.path()), None, room);
+        let told = running.subscribe_any(Select::Path(SERVO.path()), None, room);
         lock(&DONE).clear();
         std::thread::scope(|scope| {
             for thread in 0..4 {
                 let running = &running;
                 scope.spawn(move || {
                     for number in 0..1000 {
-                        running.actuate(motor, Number(f64::from(1000 * thread + number))).expect("it is armed");
+                        running.actuate(SERVO, Number(f64::from(1000 * thread + number))).expect("it is armed");
                     }
                 });
             }
@@ -80,16 +76,16 @@ fn commands_to_an_actuator_are_published_in_the_order_in_which_it_carried_them_o
 fn a_subscriber_of_a_system_topic_may_call_the_robot() {
     within(120, || {
         for topic in ["safety", "state", "parameter", "command"] {
-            let builder = Orderly::builder();
+            let builder = orderly();
             let (mut safety, mut state) =
                 (builder.subscribe(system::SafetyState), builder.subscribe(system::StateMachine));
             let (mut parameter, mut command) =
-                (builder.subscribe(orderly::param::gain), builder.subscribe(orderly::command::arm));
+                (builder.subscribe(plain::param::gain), builder.subscribe(plain::command::arm));
             let running = builder.start().expect("it starts");
             let (live, (called, is_called)) = (running.live(), mpsc::channel());
             let call = move || {
-                live.set_parameter(orderly::param::gain, 2.0).expect("it is finite");
-                let _ = live.command(orderly::command::disarm, NoArguments);
+                live.set_parameter(plain::param::gain, 2.0).expect("it is finite");
+                let _ = live.command(plain::command::disarm, NoArguments);
                 let _ = live.disarm();
                 let _ = live.arm();
                 called.send((live.safety(), live.report().faults.len())).expect("the test waits for it");
@@ -100,10 +96,10 @@ fn a_subscriber_of_a_system_topic_may_call_the_robot() {
                 "parameter" => when_woken(&mut parameter, call),
                 _ => when_woken(&mut command, call),
             }
-            running.set_parameter(orderly::param::gain, 3.0).expect("it is finite");
+            running.set_parameter(plain::param::gain, 3.0).expect("it is finite");
             // Whoever was woken by the parameter arms it as well, on a thread of the pool.
             if topic != "parameter" {
-                running.command(orderly::command::arm, NoArguments).expect("it is disarmed");
+                running.command(plain::command::arm, NoArguments).expect("it is disarmed");
             }
             let called = is_called.recv_timeout(PATIENCE);
             assert!(called.is_ok(), "{topic}: it hangs");
@@ -115,13 +111,13 @@ fn a_subscriber_of_a_system_topic_may_call_the_robot() {
 #[test]
 fn the_sink_of_a_journal_may_ask_the_robot() {
     within(120, || {
-        let live: Arc<OnceLock<Live<Orderly>>> = Arc::default();
+        let live: Arc<OnceLock<Live<Plain>>> = Arc::default();
         let (asked, is_asked) = mpsc::channel();
         let (seen, asked) = (Arc::clone(&live), Mutex::new(asked));
-        let mut builder = Orderly::builder();
+        let mut builder = orderly();
         builder.journal(move |_| {
             if let Some(live) = seen.get() {
-                let _ = live.parameter(orderly::param::gain);
+                let _ = live.parameter(plain::param::gain);
                 let _ = live.report();
                 // Nobody may wait for it any more.
                 let _ = lock(&asked).send((live.safety(), live.state()));
@@ -130,7 +126,7 @@ fn the_sink_of_a_journal_may_ask_the_robot() {
         let mut simulation = builder.simulate().expect("it starts");
         assert!(live.set(simulation.live()).is_ok());
         assert_eq!(simulation.arm(), Ok(()));
-        simulation.set_parameter(orderly::param::gain, 2.0).expect("it is finite");
+        simulation.set_parameter(plain::param::gain, 2.0).expect("it is finite");
         simulation.run_for(Duration::from_millis(3));
         assert_eq!(simulation.disarm(), Ok(()));
         assert!(is_asked.try_iter().count() > 5);
@@ -141,16 +137,16 @@ fn the_sink_of_a_journal_may_ask_the_robot() {
 #[test]
 fn a_subscriber_of_one_robot_may_ask_another_robot() {
     within(120, || {
-        let builder = Orderly::builder();
-        let mut position = builder.subscribe(orderly::sensor::base::pan::encoder::position);
+        let builder = orderly();
+        let mut position = builder.subscribe(POSITION);
         let running = builder.start().expect("it starts");
-        let other = Orderly::builder().start().expect("it starts");
+        let other = orderly().start().expect("it starts");
         let (live, (asked, is_asked)) = (other.live(), mpsc::channel());
         when_woken(&mut position, move || {
-            let answer = live.call(orderly::sensor::base::pan::encoder::position, Ask);
+            let answer = live.call(POSITION, Ask);
             asked.send(answer.map_err(|fault| fault.to_string())).expect("the test waits for it");
         });
-        running.publish(orderly::sensor::base::pan::encoder, running.clock().now(), Number(1.0));
+        running.publish(ENCODER, running.clock().now(), Number(1.0));
         assert_eq!(is_asked.recv_timeout(PATIENCE), Ok(Ok(1.0)));
     });
 }

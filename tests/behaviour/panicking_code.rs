@@ -62,17 +62,13 @@ fn guard(context: &SensorContext) -> Done {
     Ok(())
 }
 
-/// An output.
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Output {
-    /// A number.
     evil: Evil,
 }
 
 stateless! {
-    /// Emits it.
     Maker: Number => Output, |number: &Stamped<Number>| Ok(Reply::emit(Output { evil: Evil(number.0) }));
-    /// Takes it.
     Taker: Output => Number, |output: &Stamped<Output>| Ok(Reply::emit(Number(output.evil.0)));
 }
 
@@ -104,7 +100,7 @@ fn charged(code: u32) -> Result<(), Failure> {
     assert_eq!(report.sources[0].readings, 8, "and is read at its rate");
     assert_eq!(report.estimators[0].restarts, 1, "code {code}");
     assert!(outputs.drain().count() >= 7);
-    let changes: Vec<_> = health.drain().map(|change| (change.to, change.reason)).collect();
+    let changes: Vec<_> = changes_of(&health);
     let expected =
         [(HealthState::Degraded, HealthReason::Restarted), (HealthState::Healthy, HealthReason::Recovered)];
     assert_eq!(changes, expected);
@@ -120,9 +116,9 @@ fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator_which
 }
 
 #[test]
-fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher() -> Result<(), StartError> {
+fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher() {
     let _alone = one_at_a_time();
-    let running = Making::builder().start()?;
+    let running = Making::builder().start().expect("it starts");
     for number in 1..=5 {
         let output = Output { evil: Evil(f64::from(number)) };
         running.publish(making::sensor::base::curse, running.clock().now(), output);
@@ -136,11 +132,10 @@ fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher
     let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, fault.message.as_str())).collect();
     assert_eq!(faults, [(taker.path, "panicked: cursed")]);
     assert_eq!((taker.emitted, taker.inputs[0].received), (2, 5));
-    Ok(())
 }
 
 #[test]
-fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure> {
+fn outputs_that_panic_too_often_have_the_robot_made_safe() {
     let _alone = one_at_a_time();
     let mut simulation = armed_simulation(Making::builder());
     let _outputs = simulation.subscribe(making::sensor::base::source::maker);
@@ -153,21 +148,19 @@ fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure
     let report = simulation.report();
     let stopped = report.estimators[0].stopped.as_deref();
     assert!(stopped.is_some_and(|why| why.contains("code 1")), "{stopped:?}");
-    Ok(())
 }
 
 #[test]
-fn a_backoff_of_zero_does_not_keep_virtual_time_from_going_on() -> Result<(), Failure> {
+fn a_backoff_of_zero_does_not_keep_virtual_time_from_going_on() {
     let mut builder = Plain::builder();
     builder.options(SOURCE).read = |_, _| Err(Fault::new("unplugged"));
     builder.supervision().first_backoff = Duration::ZERO;
     builder.supervision().longest_backoff = Duration::ZERO;
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     simulation.run_for(Duration::from_millis(10));
     assert_eq!(simulation.clock().now(), MonotonicTime::from_nanos(10_000_000));
     let restarts = simulation.report().sources[0].restarts;
     assert!((99..=101).contains(&restarts), "100 µs apart: {restarts}");
-    Ok(())
 }
 
 #[test]

@@ -264,9 +264,8 @@ fn events_of_a_command_name_its_caller() -> Result<(), Failure> {
 
 #[test]
 fn in_real_time_it_reacts_to_a_message_at_once() -> Result<(), Failure> {
-    let builder = Drone::builder();
-    let states = builder.subscribe(drone::controller::low);
-    let running = armed(builder);
+    let running = armed(Drone::builder());
+    let states = running.subscribe(drone::controller::low);
     for (voltage, event) in [(10.0, ReactionEvent::Fulfilled), (12.0, ReactionEvent::NotFulfilled)] {
         running.publish(drone::sensor::battery, running.clock().now(), volts(voltage));
         assert_eq!(states.recv_timeout(PATIENCE).map(|state| state.payload.event), Some(event), "{voltage} V");
@@ -277,7 +276,7 @@ fn in_real_time_it_reacts_to_a_message_at_once() -> Result<(), Failure> {
 
 /// Declarations of reactions that cannot be refused at compile time are refused when the robot starts.
 #[test]
-fn options_that_can_never_work_keep_the_robot_from_starting() -> Result<(), Failure> {
+fn options_that_can_never_work_keep_the_robot_from_starting() {
     use bb_core::component::ReactionOptions;
     type Change = fn(&mut ReactionOptions);
     let cases: [(Change, &str); 3] = [
@@ -290,5 +289,4 @@ fn options_that_can_never_work_keep_the_robot_from_starting() -> Result<(), Fail
         change(builder.options(drone::controller::low));
         assert_refused(builder.simulate(), &format!("controller/low cannot start: {message}"));
     }
-    Ok(())
 }

@@ -35,7 +35,7 @@ robot! {
 }
 
 #[test]
-fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notices() -> Result<(), StartError> {
+fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notices() {
     let _alone = one_at_a_time();
     let mut simulation = armed_simulation(Workshop::builder());
     let health = simulation.subscribe(system::Health);
@@ -59,7 +59,6 @@ fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notic
     assert_eq!((started("alarm"), started("calm")), (Some(1), Some(1)));
     assert!(report.estimators.iter().all(|estimator| estimator.restarts == 0));
     assert_eq!(told(&report), ["sensor/base/plugged failed: unplugged (8 times in 1.270 s)"]);
-    Ok(())
 }
 
 static STARTLES: AtomicU32 = AtomicU32::new(0);
@@ -72,10 +71,10 @@ fn startled() -> Option<MonotonicTime> {
 }
 
 #[test]
-fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
+fn a_sensor_that_panics_in_starts_at_is_restarted() {
     let _alone = one_at_a_time();
     STARTLES.store(2, Ordering::SeqCst);
-    let mut simulation = Workshop::builder().simulate()?;
+    let mut simulation = Workshop::builder().simulate().expect("it starts");
     let startled = simulation.subscribe(workshop::sensor::base::startled);
     let beside = simulation.subscribe(workshop::sensor::base::beside);
     simulation.run_until(at(195));
@@ -85,12 +84,10 @@ fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     assert_eq!(told(&simulation.stop()), ["sensor/base/startled failed: panicked: no index (2 times in 0.010 s)"]);
 
     STARTLES.store(1, Ordering::SeqCst);
-    let builder = Workshop::builder();
-    let startled = builder.subscribe(workshop::sensor::base::startled);
-    let running = builder.start()?;
+    let running = Workshop::builder().start().expect("it starts");
+    let startled = running.subscribe(workshop::sensor::base::startled);
     assert!(startled.recv_timeout(PATIENCE).is_some(), "in real time its thread goes on");
     assert_eq!(told(&running.stop()), ["sensor/base/startled failed: panicked: no index"]);
-    Ok(())
 }
 
 /// Events of the instances, with the component's name.
@@ -177,7 +174,7 @@ robot! {
 }
 
 #[test]
-fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> Result<(), StartError> {
+fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() {
     let _alone = one_at_a_time();
     NUMBER.store(0, Ordering::SeqCst);
     lock(&LOG).clear();
@@ -206,13 +203,12 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
     let report = simulation.stop();
     assert_eq!(report.all_faults, 0, "{report}");
     lock(&LOG).clear();
-    Ok(())
 }
 
 #[test]
-fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
+fn each_component_gets_the_reason_for_its_end() {
     let _alone = one_at_a_time();
-    let mut simulation = Single::builder().simulate()?;
+    let mut simulation = Single::builder().simulate().expect("it starts");
     let last = simulation.subscribe(single::sensor::base::numbers::only);
     lock(&LOG).clear();
     // A panic ends the instance without a word; too many in its link restart what is there, but for what is below its joint.
@@ -238,7 +234,6 @@ fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
         [closed, "dropped", "ends", closed, "dropped", closed, "dropped"]
     );
     assert_eq!(logged("actuator"), ["made safe", closed, "dropped"]);
-    Ok(())
 }
 
 const HANGS: f64 = -1000.0;
@@ -254,9 +249,9 @@ fn fail(_: &mut f64, number: f64) -> Replied {
 }
 
 #[test]
-fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_after_it() -> Result<(), StartError> {
+fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_after_it() {
     let _alone = one_at_a_time();
-    let mut simulation = Workshop::builder().simulate()?;
+    let mut simulation = Workshop::builder().simulate().expect("it starts");
     let near = simulation.subscribe(workshop::sensor::base::near::near);
     simulation.publish(workshop::sensor::base::near, at(100), Number(-1.0));
     for number in 1..=9 {
@@ -268,15 +263,13 @@ fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_aft
     let report = simulation.stop();
     let near = report.estimator("sensor/base/near/near").expect("it is declared");
     assert_eq!((near.restarts, near.inputs[0].dropped(DropReason::Stopped)), (1, 0));
-    Ok(())
 }
 
 #[test]
 fn messages_that_wait_for_a_worker_outlast_its_failure() {
     alone_within(60, || {
-        let builder = Workshop::builder();
-        let apart = builder.subscribe(workshop::estimator::base::apart);
-        let running = builder.start().expect("it starts");
+        let running = Workshop::builder().start().expect("it starts");
+        let apart = running.subscribe(workshop::estimator::base::apart);
         let publish =
             |number| running.publish(workshop::sensor::base::other, running.clock().now(), Number(number));
         HERE.close("a message");
@@ -292,9 +285,9 @@ fn messages_that_wait_for_a_worker_outlast_its_failure() {
 }
 
 #[test]
-fn one_stamp_far_ahead_does_not_outlast_a_restart() -> Result<(), StartError> {
+fn one_stamp_far_ahead_does_not_outlast_a_restart() {
     let _alone = one_at_a_time();
-    let mut simulation = Workshop::builder().simulate()?;
+    let mut simulation = Workshop::builder().simulate().expect("it starts");
     let near = simulation.subscribe(workshop::sensor::base::near::near);
     simulation.run_until(at(100));
     let live = simulation.live();
@@ -305,5 +298,4 @@ fn one_stamp_far_ahead_does_not_outlast_a_restart() -> Result<(), StartError> {
     simulation.run_until(at(150));
     simulation.publish(workshop::sensor::base::near, at(160), Number(3.0));
     assert_eq!(numbers(&near), [1.0, 3.0]);
-    Ok(())
 }

@@ -79,8 +79,8 @@ fn callers_that_may_not_read_see_no_values_and_no_messages() -> Result<(), Failu
 }
 
 #[test]
-fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Failure> {
-    let robot = Plain::builder().simulate()?;
+fn a_caller_gives_no_rights_that_it_does_not_have() {
+    let robot = Plain::builder().simulate().expect("it starts");
     assert_eq!((robot.caller(), robot.rights()), ("program", Rights::ALL));
     let page = robot.for_caller("page", [Right::Read, Right::Arm]);
     let user = page.for_caller("user", [Right::Arm, Right::Commands]);
@@ -93,17 +93,16 @@ fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Failure> {
     );
     let error = page.for_caller("guest", [Right::Read]).force_disarm().expect_err("it may not");
     assert!(matches!(&error, DisarmError::Forbidden(why) if why.right == Right::Arm), "{error}");
-    Ok(())
 }
 
 #[test]
-fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Failure> {
+fn a_command_that_arms_needs_the_right_to_arm_too() {
     for (rights, missing) in [
         (vec![Right::Commands], Some(Right::Arm)),
         (vec![Right::Arm], Some(Right::Commands)),
         (vec![Right::Arm, Right::Commands], None),
     ] {
-        let mut robot = Plain::builder().simulate()?;
+        let mut robot = Plain::builder().simulate().expect("it starts");
         let page = robot.for_caller("page", rights.into_iter().collect::<Rights>());
         let started = page.start_command("command/arm", "").map(drop).map_err(|fault| fault.to_string());
         robot.run_for(Duration::from_millis(1));
@@ -116,7 +115,6 @@ fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Failure> {
             }
         }
     }
-    Ok(())
 }
 
 /// Events, lines of the journal and a replay name the same callers.

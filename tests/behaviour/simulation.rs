@@ -24,8 +24,8 @@ robot! {
 }
 
 #[test]
-fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() -> Result<(), StartError> {
-    let mut simulation = Clockwork::builder().simulate()?;
+fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() {
+    let mut simulation = Clockwork::builder().simulate().expect("it starts");
     let slow = simulation.subscribe(clockwork::sensor::base::slow);
     let rated = simulation.subscribe(clockwork::sensor::base::rated);
     simulation.run_for(Duration::from_millis(495));
@@ -33,7 +33,6 @@ fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() -> Result<(),
     assert_eq!(rated.drain().count(), 50);
     let slow: Vec<_> = slow.drain().map(|number| (number.monotonic_time, number.0)).collect();
     assert_eq!(slow, [(at(0), 100.0), (at(250), 101.0)]);
-    Ok(())
 }
 
 /// Forgets to say when to read it next.
@@ -42,38 +41,35 @@ fn restless(_: u32, now: MonotonicTime) -> Read {
 }
 
 #[test]
-fn a_sensor_that_stops_virtual_time_is_stopped_and_named() -> Result<(), StartError> {
+fn a_sensor_that_stops_virtual_time_is_stopped_and_named() {
     let mut builder = Clockwork::builder();
     builder.options(clockwork::sensor::base::odd).read = restless;
     builder.options(clockwork::sensor::base::no_rate).count = 5;
-    let mut simulation = builder.simulate()?;
+    let mut simulation = builder.simulate().expect("it starts");
     simulation.run_to_end();
     let faults = simulation.stop().faults;
     let paths: Vec<_> = faults.iter().map(|fault| fault.path).collect();
     assert_eq!(paths, ["sensor/base/odd", "sensor/base/no_rate"]);
     assert!(faults[1].message.contains("declare `rate`"), "{}", faults[1]);
-    Ok(())
 }
 
 #[test]
-fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() -> Result<(), StartError> {
-    let mut simulation = Clockwork::builder().simulate()?;
+fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() {
+    let mut simulation = Clockwork::builder().simulate().expect("it starts");
     let rated = simulation.subscribe(clockwork::sensor::base::rated);
     simulation.run_for(Duration::from_millis(5));
     simulation.publish(clockwork::sensor::base::fed, at(35), Number(0.0));
     simulation.run_until(at(60));
     let times: Vec<_> = rated.drain().map(|number| number.monotonic_time).collect();
     assert_eq!(times, [0, 10, 20, 30, 40, 50, 60].map(at));
-    Ok(())
 }
 
 #[test]
-fn of_sensors_due_at_once_the_driver_is_read_last() -> Result<(), StartError> {
-    let mut simulation = Clockwork::builder().simulate()?;
+fn of_sensors_due_at_once_the_driver_is_read_last() {
+    let mut simulation = Clockwork::builder().simulate().expect("it starts");
     let both = simulation.subscribe(clockwork::estimator::base::both);
     simulation.run_to_end();
     assert_eq!(both.drain().filter(|seen| seen.driver == seen.second).count(), 10);
-    Ok(())
 }
 
 const MADE_AT: MonotonicTime = MonotonicTime::from_nanos(1_600_000_000_000_000_000);
@@ -85,7 +81,7 @@ fn recording(number: u32, now: MonotonicTime) -> Read {
 }
 
 #[test]
-fn virtual_time_starts_with_a_recording_and_real_time_refuses_one() -> Result<(), StartError> {
+fn virtual_time_starts_with_a_recording_and_real_time_refuses_one() {
     let builder = || {
         let mut builder = Clockwork::builder();
         let odd = builder.options(clockwork::sensor::base::odd);
@@ -95,13 +91,12 @@ fn virtual_time_starts_with_a_recording_and_real_time_refuses_one() -> Result<()
     let first = builder();
     let (rated, played) =
         (first.subscribe(clockwork::sensor::base::rated), first.subscribe(clockwork::sensor::base::odd));
-    let mut simulation = first.simulate()?;
+    let mut simulation = first.simulate().expect("it starts");
     simulation.run_to_end();
     assert_eq!(rated.try_recv().map(|number| number.monotonic_time), Some(MADE_AT));
     assert_eq!(played.drain().count(), 2);
-    let mut running = builder().start()?;
+    let mut running = builder().start().expect("it starts");
     running.wait();
     let faults = running.stop().faults;
     assert!(faults.len() == 1 && faults[0].message.contains("needs virtual time"), "{faults:?}");
-    Ok(())
 }

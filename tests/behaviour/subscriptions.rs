@@ -12,24 +12,6 @@ robot! {
     link base { sensor numbers: Counter(count = 10) { rate: 1 kHz; estimator scaled: Scale(); } }
 }
 
-#[test]
-fn the_subscribers_of_a_path_are_listed() -> Result<(), StartError> {
-    let mut simulation = Talker::builder().simulate()?;
-    let bus = simulation.bus();
-    let slow = simulation.subscribe_with(talker::sensor::base::numbers, Overflow::DropOldest { capacity: 3 });
-    // An absurd capacity is bounded.
-    let all = Overflow::DropOldest { capacity: usize::MAX };
-    let any = simulation.subscribe_any(Select::Below("sensor"), None, all);
-    simulation.run_to_end();
-    let subscribers: Vec<_> = bus.subscribers("sensor/base/numbers");
-    let told: Vec<_> = subscribers.iter().map(|one| (one.is_typed, one.waiting, one.capacity, one.lost)).collect();
-    assert_eq!(told, [(true, 3, 3, 7), (false, 20, Overflow::MAX_CAPACITY, 0)]);
-    drop((slow, any));
-    assert_eq!(bus.subscribers("sensor/base/numbers"), []);
-    assert_eq!(bus.subscribers("sensor/nobody"), []);
-    Ok(())
-}
-
 #[tokio::test]
 async fn a_subscription_can_be_awaited() -> Result<(), StartError> {
     let builder = Talker::builder();

@@ -50,7 +50,7 @@ robot! {
 }
 
 #[test]
-fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(), StartError> {
+fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() {
     let _alone = one_at_a_time();
     let mut builder = Family::builder();
     // It is back before the next message.
@@ -81,12 +81,11 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
     let report = simulation.stop();
     let failing = report.estimator("sensor/base/neck/head/number/failing").expect("it is declared");
     assert_eq!((failing.restarts, failing.stopped.as_deref()), (12, Some("panicked: no fix")));
-    Ok(())
 }
 
 /// Nested in a sensor at a joint, an estimator belongs to the joint; nested in one of the robot, to the robot.
 #[test]
-fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), StartError> {
+fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() {
     let _alone = one_at_a_time();
     let mut builder = Family::builder();
     builder.supervision().longest_backoff = Duration::from_millis(250);
@@ -113,12 +112,11 @@ fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), Sta
         );
         assert_eq!(simulation.safety() == Safety::Error, failure == 4, "there is nobody above");
     }
-    Ok(())
 }
 
 /// A fault that may pass, as often as it comes; one that stays; and one as if it had not been there.
 #[test]
-fn a_fault_never_touches_another_component() -> Result<(), StartError> {
+fn a_fault_never_touches_another_component() {
     let _alone = one_at_a_time();
     for (number, restarts, dispatched) in [(4.0, 16..200, 17..201), (2.0, 0..1, 1..2), (3.0, 0..1, 1..2)] {
         let mut simulation = armed_simulation(Family::builder());
@@ -136,7 +134,6 @@ fn a_fault_never_touches_another_component() -> Result<(), StartError> {
             "{number}: {report}"
         );
     }
-    Ok(())
 }
 
 static FLAKY: Mutex<Vec<i64>> = Mutex::new(Vec::new());

@@ -54,9 +54,8 @@ fn hang(running: &Running<Laden>) {
 #[test]
 fn what_does_not_fit_while_it_hangs_is_counted_and_the_rest_comes_in_order() {
     alone_within(60, || {
-        let builder = Laden::builder();
-        let heavy = builder.subscribe_with(laden::estimator::base::heavy, Overflow::DropOldest { capacity: 4096 });
-        let running = builder.start().expect("it starts");
+        let running = Laden::builder().start().expect("it starts");
+        let heavy = running.subscribe_with(laden::estimator::base::heavy, Overflow::DropOldest { capacity: 4096 });
         hang(&running);
         // Nobody waits for it.
         (0..1500).for_each(|number| publish(&running, f64::from(number)));
@@ -76,10 +75,9 @@ fn what_does_not_fit_while_it_hangs_is_counted_and_the_rest_comes_in_order() {
 #[test]
 fn it_restarts_ticks_and_is_lost_as_any_other() {
     alone_within(60, || {
-        let builder = Laden::builder();
-        let heavy = builder.subscribe(laden::estimator::base::heavy);
-        let health = builder.subscribe(system::Health);
-        let running = builder.start().expect("it starts");
+        let running = Laden::builder().start().expect("it starts");
+        let heavy = running.subscribe(laden::estimator::base::heavy);
+        let health = running.subscribe(system::Health);
         let next = || heavy.recv_timeout(PATIENCE).expect("it goes on").0;
         assert_eq!(next(), -10.0, "it ticks before anything has come");
         publish(&running, PANICS);
