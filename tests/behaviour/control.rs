@@ -143,10 +143,8 @@ fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> 
     assert!(simulation.command(commanded::command::go, millis(1)).is_err(), "by default only when idle");
     let lost = simulation.command(commanded::command::watch, Target { millis: 1, does: Some("lost") })?;
     simulation.run_until(at(20));
-    assert_refused(
-        lost.try_result().expect("it has ended"),
-        "the command failed: it names the next state `lost`, which is not declared",
-    );
+    let says = "the command failed: it names the next state `lost`, which is not declared";
+    assert_refused(lost.try_result().expect("it has ended"), says);
     assert_eq!(simulation.state(), "parked");
     Ok(())
 }
@@ -187,16 +185,12 @@ fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Failure> {
     let mut simulation = armed_simulation(Commanded::builder());
     let first = simulation.command(commanded::command::turn, millis(500))?;
     let second = simulation.command(commanded::command::turn, millis(500))?;
-    assert_refused(
-        simulation.command(commanded::command::turn, millis(500)),
-        "`turn` is refused: 2 of the category `motion` run already, and no more may",
-    );
+    let says = "`turn` is refused: 2 of the category `motion` run already, and no more may";
+    assert_refused(simulation.command(commanded::command::turn, millis(500)), says);
     let watching = simulation.command(commanded::command::watch, millis(500))?;
     simulation.run_until(at(100));
-    assert!(
-        simulation.command(commanded::command::stop, millis(10)).is_err(),
-        "watching is of its own category, the default one, which it does not cancel"
-    );
+    // Watching is of its own category, the default one, which it does not cancel.
+    assert!(simulation.command(commanded::command::stop, millis(10)).is_err());
     let halting = simulation.command(commanded::command::halt, millis(10))?;
     simulation.run_until(at(200));
     for cancelled in [first, second, watching] {
@@ -249,15 +243,10 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failu
     assert_eq!(disarming.try_result(), Some(Err(CommandError::Failed(failed))));
     assert_eq!((simulation.state(), simulation.safety()), ("disarmed", Safety::Error));
     let error = errors.try_recv().expect("it is published");
-    assert_eq!(
-        (error.path, error.error.message.as_str()),
-        ("actuator/base/pan/servo", "disarming failed: the brake does not close")
-    );
-    assert_eq!(
-        (simulation.arm(), simulation.disarm()),
-        (Err(ArmError::Error), Err(DisarmError::Error)),
-        "neither leads out"
-    );
+    let expected = ("actuator/base/pan/servo", "disarming failed: the brake does not close");
+    assert_eq!((error.path, error.error.message.as_str()), expected);
+    let neither_leads_out = (Err(ArmError::Error), Err(DisarmError::Error));
+    assert_eq!((simulation.arm(), simulation.disarm()), neither_leads_out);
     let refusal = simulation.command(commanded::command::arm, NoArguments).expect_err("it is not safe");
     assert_eq!(refusal.reason, RefusalReason::Safety);
     assert!(simulation.force_disarm().is_err(), "the brake still does not close");

@@ -245,23 +245,19 @@ fn a_message_of_ros_is_stamped_by_its_header_or_refused() -> Result<(), Failure>
         let message = arrived.try_recv().ok_or("nothing has arrived")?;
         Ok(now.as_nanos() - message.monotonic_time.as_nanos())
     };
-    for (age, counted) in [
-        (None, 0),
-        (Some(0), 0),
-        (Some(2_500_000_000), 2_500_000_000),
-        (Some(10_000_000_000), 10_000_000_000),
-        (Some(-100_000_000), 0),
-    ] {
-        assert_eq!(publish(age), Ok(counted), "{age:?}");
-    }
     let refused =
-        |age, says: &str| (age, format!("nothing is published at `own/range`: the stamp of its header is {says}"));
-    for (age, error) in [
-        refused(10_000_000_001, "10.0 s old by the robot's clock: expected at most 10 s"),
-        refused(3_600_000_000_000, "3600.0 s old by the robot's clock: expected at most 10 s"),
-        refused(-1_500_000_000, "1.5 s ahead of the robot's clock: expected at most 100 ms"),
+        |says: &str| Err(format!("nothing is published at `own/range`: the stamp of its header is {says}"));
+    for (age, counted) in [
+        (None, Ok(0)),
+        (Some(0), Ok(0)),
+        (Some(2_500_000_000), Ok(2_500_000_000)),
+        (Some(10_000_000_000), Ok(10_000_000_000)),
+        (Some(-100_000_000), Ok(0)),
+        (Some(10_000_000_001), refused("10.0 s old by the robot's clock: expected at most 10 s")),
+        (Some(3_600_000_000_000), refused("3600.0 s old by the robot's clock: expected at most 10 s")),
+        (Some(-1_500_000_000), refused("1.5 s ahead of the robot's clock: expected at most 100 ms")),
     ] {
-        assert_eq!(publish(Some(age)), Err(error));
+        assert_eq!(publish(age), counted, "{age:?}");
     }
     assert_eq!(arrived.drain().count(), 0);
     Ok(())

@@ -208,10 +208,8 @@ fn a_command_gets_the_change_and_a_refused_one_is_counted_and_changes_nothing() 
     assert_eq!((refusal.reason, refusal.state), (RefusalReason::State, "disarmed"));
     assert_eq!(refusal.to_string(), "`slow_down` is refused: it is not allowed in the state `disarmed`");
     let health = event.health.expect("a change of health wanted it");
-    assert_eq!(
-        (health.estimator, health.source, health.reason),
-        (WATCH, "sensor/base/number", HealthReason::Diverged)
-    );
+    let expected = (WATCH, "sensor/base/number", HealthReason::Diverged);
+    assert_eq!((health.estimator, health.source, health.reason), expected);
     assert_eq!((health.from, health.to, health.time), (HealthState::Healthy, HealthState::Degraded, at(10)));
     let report = run.simulation.report();
     let statistics = report.commands.iter().find(|command| command.name == "slow_down").expect("it is declared");

@@ -27,6 +27,9 @@ fn birth(context: &Context) -> f64 {
     context.now().as_nanos() as f64
 }
 
+/// Code that lets an estimator keep its sum when its gain changes.
+const TUNE: Option<fn(f64) -> Done> = Some(|_| Ok(()));
+
 /// A request that a journal holds by its name alone.
 struct Forget;
 
@@ -48,10 +51,6 @@ impl HandleCast<Doubt> for Echo {
 
 /// Number after which the actuator cannot be made safe.
 const REFUSES: f64 = 99.0;
-
-fn moves(to: f64) -> Done {
-    if to < 0.0 { Err(Fault::new("it is at its end")) } else { Ok(()) }
-}
 
 fn brakes(last: f64) -> Done {
     if last == REFUSES { Err(Fault::new("no brake")) } else { Ok(()) }
@@ -102,12 +101,14 @@ robot! {
     link base {
         joint pan: continuous {
             axis: z;
-            sensor encoder: External<Number>() { estimator position: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = Some(|_| Ok(()))); }
-            actuator servo: Servo(command = moves, disarm = brakes);
+            sensor encoder: External<Number>() {
+                estimator position: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = TUNE);
+            }
+            actuator servo: Servo(disarm = brakes);
             link head { }
         }
         sensor number: External<Number>() {
-            estimator sum: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = Some(|_| Ok(()))) {
+            estimator sum: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = TUNE) {
                 latency_budget: 2 ms;
                 lost_after: 40 ms;
                 recover_after: 2;
@@ -115,8 +116,10 @@ robot! {
                 on_lost: alarm;
             }
         }
-        estimator apart: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = Some(|_| Ok(()))) { input number: sensor::base::number::sum; runs_on: worker; }
-        estimator behind: Echo(keep = birth, input = add) { input number: estimator::base::apart; }
+        estimator apart: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = TUNE) {
+            input number: sensor::base::number::sum;
+            runs_on: worker;
+        }
     }
 }
 

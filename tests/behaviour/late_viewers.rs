@@ -66,10 +66,8 @@ fn a_late_bus_names_all_that_is_wrong_since_when_and_why() -> Result<(), Failure
     assert!(simulation.start_command("command/travel", "").is_err());
     simulation.run_until(at(2000));
     simulation.arm()?;
-    assert_refused(
-        simulation.send_json("actuator/base/tilt/jammed", "1"),
-        "the actuator failed: the gear is jammed",
-    );
+    let says = "the actuator failed: the gear is jammed";
+    assert_refused(simulation.send_json("actuator/base/tilt/jammed", "1"), says);
     let late = simulation.bus().for_caller("page", [Right::Read]);
     let seen = report(&late)?;
     let expected = [
@@ -129,10 +127,8 @@ fn another_caller_lists_and_cancels_what_runs() -> Result<(), Failure> {
     second.cancel(execution.number)?;
     assert_eq!(started.try_result().map(|result| result.is_err()), Some(true));
     assert_eq!(second.executions(), []);
-    assert_refused(
-        second.cancel(execution.number),
-        &format!("no execution with the number {} runs", execution.number),
-    );
+    let says = format!("no execution with the number {} runs", execution.number);
+    assert_refused(second.cancel(execution.number), &says);
     Ok(())
 }
 

@@ -67,25 +67,19 @@ impl Actuator for Odd {
     }
 }
 
-/// A servo that takes positions alone and keeps what it was told.
+/// A servo that takes positions alone and notes what it is told.
 struct Hobby(Arc<Mutex<Vec<f64>>>);
 
-#[derive(Clone, Debug, Default, Options)]
-struct HobbyOptions {
-    #[option(required)]
-    commanded: Arc<Mutex<Vec<f64>>>,
-}
-
 impl Actuator for Hobby {
-    type Options = HobbyOptions;
+    type Options = NoOptions;
     type Command = PositionCommand;
 
-    fn init(options: HobbyOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self(options.commanded))
+    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self(context.shared(Mutex::default)))
     }
 
     fn handle_command(&mut self, command: &Stamped<PositionCommand>) -> Result<(), Fault> {
-        self.0.lock().map_err(|_| Fault::new("poisoned"))?.push(command.position);
+        lock(&self.0).push(command.position);
         Ok(())
     }
 
@@ -157,7 +151,7 @@ robot! {
         joint flap: revolute {
             axis: z;
             limit: { lower: -10 deg, upper: 10 deg, velocity: 1 rad/s, effort: 1 N*m };
-            actuator servo: Hobby(commanded = Arc::default());
+            actuator servo: Hobby();
             sensor encoder: External<JointState>();
             link plate;
         }
@@ -213,10 +207,8 @@ fn true_position(simulation: &Simulation<Crane>, joint: &str) -> Result<f64, Fai
 
 #[test]
 fn what_is_declared_for_hardware_starts_only_where_it_is_replaced() -> Result<(), Failure> {
-    assert_refused(
-        Crane::builder().simulate(),
-        "actuator/base/slew/boom/reach/motor cannot start: no such bus: can0",
-    );
+    let says = "actuator/base/slew/boom/reach/motor cannot start: no such bus: can0";
+    assert_refused(Crane::builder().simulate(), says);
 
     let mut builder = Crane::builder();
     let options = SimulatedActuatorOptions::defaults();

@@ -61,10 +61,8 @@ fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> 
     assert_eq!(simulation.call(BOUND, Which)?, BoundOptions { gain: 2.0, count: 2, ..BOUND_OPTIONS });
     let told = changes(&all);
     let paths: Vec<_> = told.iter().map(|(path, ..)| *path).collect();
-    assert_eq!(
-        (paths, told[0].1.clone()),
-        (vec!["param/count", "param/name", "param/gain"], ParameterValue::Integer(1))
-    );
+    let expected = (vec!["param/count", "param/name", "param/gain"], ParameterValue::Integer(1));
+    assert_eq!((paths, told[0].1.clone()), expected);
     Ok(())
 }
 
@@ -217,13 +215,12 @@ robot! {
 }
 
 #[test]
-fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failure> {
+fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() {
     let _alone = one_at_a_time();
-    let mut simulation = SelfTuned::builder().simulate()?;
+    let mut simulation = SelfTuned::builder().simulate().expect("it starts");
     simulation.run_for(Duration::from_millis(50));
     assert_eq!(*lock(&TUNED), (vec![5.0], Some(true)));
-    simulation.stop().ok()?;
-    Ok(())
+    simulation.stop().ok().expect("nothing is wrong");
 }
 
 #[test]

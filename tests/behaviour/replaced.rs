@@ -111,10 +111,10 @@ fn a_replacement_has_the_health_and_the_supervision_of_what_is_declared() -> Res
     let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(100));
-    let positive: Vec<_> = numbers.drain().filter(|number| number.0 > 0.0).collect();
-    let seen: Vec<_> = positive.iter().map(|number| (number.monotonic_time, number.0)).collect();
+    let mut seen = timed(&numbers);
+    seen.retain(|(_, number)| *number > 0.0);
     // It fails at 20 ms and is created again at 30 ms with the same options, so it counts from one until it fails again.
-    assert_eq!(seen, [(at(0), 1.0), (at(10), 2.0), (at(30), 1.0), (at(40), 2.0)]);
+    assert_eq!(seen, [(0, 1.0), (10, 2.0), (30, 1.0), (40, 2.0)]);
     let health: Vec<_> = health.drain().map(|change| change.payload.to_string()).collect();
     let expected = [
         "0.020000000 s: sensor/base/count/scaled healthy -> degraded (restarted; sensor/base/count/scaled)",
@@ -170,10 +170,8 @@ fn options_of_replaced_components_are_ignored() -> Result<(), Failure> {
         builder.options(SOURCE).gain = -1.0;
         builder
     };
-    assert_refused(
-        desk().simulate(),
-        "sensor/base/source cannot start: option `gain` is -1, but must be in 0.0..=1e6",
-    );
+    let says = "sensor/base/source cannot start: option `gain` is -1, but must be in 0.0..=1e6";
+    assert_refused(desk().simulate(), says);
     let mut builder = desk();
     builder.replace_sensor::<Counter>("sensor/base/source", CounterOptions::defaults())?;
     builder.simulate()?.stop().ok()?;

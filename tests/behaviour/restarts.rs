@@ -183,8 +183,7 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() {
     simulation.run_until(at(55));
     simulation.set_parameter(single::param::gain, 2.0).expect("it is finite");
     simulation.run_until(at(154));
-    let last: Vec<_> = last.drain().map(|number| (number.monotonic_time, number.0)).collect();
-    assert_eq!(last, [(at(55), -1.0)], "what the old one still held");
+    assert_eq!(timed(&last), [(55, -1.0)], "what the old one still held");
     let closed = "closed: new options";
     assert_eq!(logged("sensor"), ["made", closed, "dropped", "made"]);
     let of_estimator = logged("estimator");
@@ -229,10 +228,8 @@ fn each_component_gets_the_reason_for_its_end() {
     simulation.stop();
     assert_eq!(last.drain().count(), 1, "before it stops");
     let closed = "closed: the robot stops";
-    assert_eq!(
-        [logged("sensor"), logged("estimator"), logged("faulty")].concat(),
-        [closed, "dropped", "ends", closed, "dropped", closed, "dropped"]
-    );
+    let expected = [closed, "dropped", "ends", closed, "dropped", closed, "dropped"];
+    assert_eq!([logged("sensor"), logged("estimator"), logged("faulty")].concat(), expected);
     assert_eq!(logged("actuator"), ["made safe", closed, "dropped"]);
 }
 

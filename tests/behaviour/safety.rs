@@ -94,9 +94,8 @@ fn a_robot_that_is_disarmed_twice_is_made_safe_once() {
         let all = format!("not everything could be made safe: `actuator/base/pan/servo`: {says}");
         assert_refused(running.disarm(), &all);
         assert_eq!(errors.try_recv().map(|error| error.payload.error.message).as_deref(), Some(says));
-        assert!(
-            running.safety() == Safety::Error && running.disarm().is_err() && running.safety() == Safety::Error
-        );
+        assert!(running.safety() == Safety::Error && running.disarm().is_err());
+        assert_eq!(running.safety(), Safety::Error);
         assert!(running.force_disarm().is_err(), "it still cannot");
         assert_eq!(running.safety(), Safety::Disarmed);
     });

@@ -31,8 +31,7 @@ fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() {
     simulation.run_for(Duration::from_millis(495));
     assert_eq!(simulation.clock().now(), at(495));
     assert_eq!(rated.drain().count(), 50);
-    let slow: Vec<_> = slow.drain().map(|number| (number.monotonic_time, number.0)).collect();
-    assert_eq!(slow, [(at(0), 100.0), (at(250), 101.0)]);
+    assert_eq!(timed(&slow), [(0, 100.0), (250, 101.0)]);
 }
 
 /// Forgets to say when to read it next.

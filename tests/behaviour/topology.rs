@@ -116,9 +116,7 @@ fn components_are_declared_onto_a_urdf() -> Result<(), StartError> {
     let encoder = builder.subscribe(arm::sensor::base_link::elbow::encoder);
     builder.simulate()?.step();
     assert_eq!(base.try_recv().map(|number| number.frame.name()), Some("base-link"));
-    assert_eq!(
-        (tool.path(), encoder.path()),
-        ("sensor/base_link/elbow/upper/flange/tool/imu", "sensor/base_link/elbow/encoder")
-    );
+    let expected = ("sensor/base_link/elbow/upper/flange/tool/imu", "sensor/base_link/elbow/encoder");
+    assert_eq!((tool.path(), encoder.path()), expected);
     Ok(())
 }

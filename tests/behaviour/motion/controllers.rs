@@ -1,7 +1,7 @@
 //! Controllers that drive an actuator.
 
 use super::*;
-use bb_estimators::motion::PidState;
+use bb_estimators::motion::PidControllerOptions;
 
 #[test]
 fn a_controller_holds_its_setpoint_which_is_a_parameter() -> Result<(), Failure> {
@@ -125,57 +125,33 @@ fn a_threshold_switches_its_actuator_on_again_after_a_disarming() -> Result<(), 
     Ok(())
 }
 
-/// Always commands the same velocity.
-struct Steady(bb_core::run::ActuatorLink<ActuatorCommand>, f64);
-
-#[derive(Clone, Debug, Options)]
-struct SteadyOptions {
-    #[option(default = 0.5, range = -1.0..=1.0)]
-    velocity: f64,
-}
-
-impl Service for Steady {
-    type Options = SteadyOptions;
-    type Output = PidState;
-
-    fn init(options: SteadyOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        Ok(Self(context.bus().actuator("actuator/base/spin/motor")?, options.velocity))
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<PidState>, Fault> {
-        // It is refused until the robot is armed.
-        let _ = self.0.send(move_at(self.1));
-        Ok(Reading::nothing())
-    }
-}
-
 #[test]
 fn another_controller_takes_the_place_of_a_declared_one() -> Result<(), Failure> {
+    let options = PidControllerOptions {
+        measurement: "sensor/base/spin/encoder",
+        actuator: "actuator/base/spin/motor",
+        setpoint: -0.5,
+        kp: 4.0,
+        ..PidControllerOptions::defaults()
+    };
     let mut builder = simulated()?;
-    let options = SteadyOptions { velocity: -0.5 };
-    let error = builder.replace_service::<Steady>("controller/hod", options.clone()).expect_err("a typo");
     let says = "no controller or bridge is at `controller/hod`; did you mean `controller/hold`?";
-    assert_eq!(error.to_string(), says);
-    builder.replace_service::<Steady>("controller/hold", options)?;
+    assert_refused(builder.replace_service::<PidController>("controller/hod", options.clone()), says);
+    builder.replace_service::<PidController>("controller/hold", options.clone())?;
     let mut simulation = armed_simulation(builder);
     simulation.run_for(Duration::from_secs(1));
-    // The gain belongs to the replaced one.
-    simulation.set_parameter(crane::param::gains::kp, 9.0)?;
-    simulation.run_for(Duration::from_secs(1));
-    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
-    assert_eq!(world.joint("spin", simulation.clock().now())?.point.velocity, -0.5);
+    // The setpoint that is declared belongs to the replaced one.
+    simulation.set_parameter(crane::param::gains::setpoint, 9.0)?;
+    simulation.run_for(Duration::from_secs(4));
+    assert!((true_position(&simulation, "spin")? + 0.5).abs() < 1e-3);
 
     let mut builder = simulated()?;
     let threshold = bb_estimators::motion::ThresholdControllerOptions::defaults();
     builder.replace_service::<ThresholdController>("controller/hold", threshold)?;
     let says = "controller/hold cannot start: its replacement publishes `ThresholdState`, and what is declared publishes `PidState`";
     assert_refused(builder.simulate(), says);
-    let refused = SteadyOptions { velocity: 3.0 };
     let mut builder = simulated()?;
-    builder.replace_service::<Steady>("controller/hold", refused)?;
-    assert_refused(
-        builder.simulate(),
-        "controller/hold cannot start: option `velocity` is 3, but must be in -1.0..=1.0",
-    );
+    builder.replace_service::<PidController>("controller/hold", PidControllerOptions { kp: -1.0, ..options })?;
+    assert_refused(builder.simulate(), "controller/hold cannot start: option `kp` is -1, but must be in 0.0..=1e9");
     Ok(())
 }

@@ -5,10 +5,8 @@ use super::*;
 /// A value at a bound is carried out as it is; the next number beyond it is clamped, and counted.
 #[test]
 fn commands_beyond_a_limit_are_brought_back_and_counted_and_each_bound_is_allowed() -> Result<(), Failure> {
-    let commanded = Arc::new(Mutex::new(Vec::new()));
-    let mut builder = simulated()?;
-    builder.options(crane::actuator::base::flap::servo).commanded = Arc::clone(&commanded);
-    let simulation = armed_simulation(builder);
+    let simulation = armed_simulation(simulated()?);
+    let commanded = simulation.shared(Mutex::<Vec<f64>>::default);
     let servo = crane::actuator::base::flap::servo;
     let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
     let limited = || -> Vec<u64> {
