@@ -11,14 +11,8 @@ robot! {
         sensor imu: SimulatedImu(duration = 2 s) {
             rate: 100 Hz;
             estimator plain: Madgwick<Marg>();
-            estimator madgwick: Madgwick<Marg, AttitudeOutputs>() {
-                output orientation;
-                output status;
-            }
-            estimator mekf: Mekf<Marg, AttitudeOutputs>() {
-                output orientation;
-                output status;
-            }
+            estimator madgwick: Madgwick<Marg, AttitudeOutputs>() { output orientation; output status; }
+            estimator mekf: Mekf<Marg, AttitudeOutputs>() { output orientation; output status; }
         }
     }
 }

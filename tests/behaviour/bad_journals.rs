@@ -129,20 +129,10 @@ fn child() {
     drop(recorder);
 }
 
-/// Reads the entries of a file up to where it breaks off.
-fn lines_of(file: &std::path::Path) -> Result<Vec<Entry>, Failure> {
-    let reader = JournalReader::<Again>::default();
-    let recording = Recording::open(file)?;
-    let lines = recording.messages::<JournalLine>("journal")?.map_while(Result::ok);
-    lines.map(|line| Ok(reader.entry(&line.payload)?)).collect()
-}
-
 #[test]
 fn the_journal_of_a_robot_that_was_killed_is_replayed_up_to_where_it_breaks_off() -> Result<(), Failure> {
-    static NUMBER: AtomicU32 = AtomicU32::new(0);
     for rounds in [100, 333, 871] {
-        let number = NUMBER.fetch_add(1, Ordering::SeqCst);
-        let file = std::env::temp_dir().join(format!("bb-killed-{}-{number}.mcap", std::process::id()));
+        let file = std::env::temp_dir().join(format!("bb-killed-{}-{rounds}.mcap", std::process::id()));
         let _ = std::fs::remove_file(&file);
         let mut child = std::process::Command::new(std::env::current_exe()?)
             .args(["--exact", "bad_journals::child", "--nocapture"])
@@ -163,7 +153,10 @@ fn the_journal_of_a_robot_that_was_killed_is_replayed_up_to_where_it_breaks_off(
         std::thread::sleep(Duration::from_micros(u64::from(rounds) * 37 % 5000));
         child.kill()?;
         child.wait()?;
-        let mut lines = lines_of(&file)?;
+        // What the file holds up to where it breaks off.
+        let (reader, recording) = (JournalReader::<Again>::default(), Recording::open(&file)?);
+        let lines = recording.messages::<JournalLine>("journal")?.map_while(Result::ok);
+        let mut lines: Vec<_> = lines.map(|line| reader.entry(&line.payload)).collect::<Result<_, _>>()?;
         std::fs::remove_file(&file)?;
         lines.sort_by_key(|line| line.number);
         let whole = (1..).zip(&lines).take_while(|(number, line)| *number == line.number).count();

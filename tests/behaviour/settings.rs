@@ -75,11 +75,6 @@ robot! {
     }
 }
 
-fn options(builder: Builder<Set>) -> EveryOptions {
-    let simulation = builder.simulate().expect("the robot starts");
-    simulation.call(set::sensor::base::source::every, Which).expect("it answers")
-}
-
 #[test]
 fn a_file_sets_options_and_parameters_alike() {
     let mut builder = Set::builder();
@@ -110,7 +105,8 @@ fn a_file_sets_options_and_parameters_alike() {
     builder.set("sensor/base/source/every/name", "plain text").expect("it needs no quotation marks");
     let listed = builder.settings().to_string();
     assert!(listed.contains("count = -7\n") && listed.contains("limit = \"1 m/s\"\n"), "{listed}");
-    let options = options(builder);
+    let simulation = builder.simulate().expect("it starts");
+    let options = simulation.call(set::sensor::base::source::every, Which).expect("it answers");
     assert_eq!(options.port, PathBuf::from("/dev/ttyUSB0"));
     assert_eq!(options.maximum_range, 12.0);
     assert_eq!(options.timeout, Duration::from_millis(500));

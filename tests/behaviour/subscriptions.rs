@@ -1,6 +1,5 @@
 //! Subscriptions to typed handles.
 
-mod rates;
 mod same;
 
 use crate::kit::*;
@@ -93,5 +92,42 @@ fn a_selection_that_matches_nothing_names_the_nearest() -> Result<(), Failure> {
     assert!(bus.subscribe::<Number>("sensor/base/numbers", Overflow::default())?.matched()?.unmatched().is_none());
     let other = bus.subscribe::<Imu>("sensor/base/numbers", Overflow::default());
     assert_refused(other, "`sensor/base/numbers` publishes `Number`, not `Imu`");
+    Ok(())
+}
+
+/// Repeats what it is delivered, ten times a second at most, until it has seen the last number.
+fn watch(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        let bus = context.bus();
+        let rate = Overflow::KeepLatest.at_most_every(Duration::from_millis(100));
+        let mut numbers = bus.subscribe::<Number>("sensor/base/numbers", rate)?;
+        let seen = bus.publisher("watch/seen")?;
+        while let Some(number) = numbers.recv_async().await {
+            seen.publish(number.payload);
+            if number.0 == 449.0 {
+                break;
+            }
+        }
+        Ok(Outcome::done(()))
+    })
+}
+
+/// Unit tests have the laws of rates, and `tests/stress.rs` has them in real time and in replays.
+#[test]
+fn a_command_is_woken_at_the_rate_on_virtual_time() -> Result<(), Failure> {
+    let mut builder = Talker::builder();
+    builder.options(talker::sensor::base::numbers).count = 450;
+    builder.options(talker::command::watch).run = watch;
+    let mut simulation = builder.simulate()?;
+    let seen = simulation.bus().subscribe::<Number>("watch/seen", Overflow::default())?;
+    simulation.command(talker::command::arm, NoArguments)?;
+    let watch = simulation.command(talker::command::watch, NoArguments);
+    assert!(watch.is_err(), "it is armed when the simulation runs");
+    simulation.run_for(Duration::ZERO);
+    let watch = simulation.command(talker::command::watch, NoArguments)?;
+    simulation.run_for(Duration::from_secs(1));
+    // The first number was published before.
+    assert_eq!(timed(&seen), [(1, 1.0), (101, 100.0), (201, 200.0), (301, 300.0), (401, 400.0), (501, 449.0)]);
+    assert!(watch.try_result().is_some_and(|result| result.is_ok()));
     Ok(())
 }

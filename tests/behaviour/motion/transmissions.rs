@@ -268,21 +268,17 @@ fn a_command_that_says_nothing_of_motors_is_refused_at_a_transmission() -> Resul
     Ok(())
 }
 
-#[test]
-fn a_urdf_keeps_ratio_offset_and_direction() {
-    let urdf = Geared::to_urdf();
-    assert!(urdf.contains("<offset>0.5</offset>"), "{urdf}");
-    assert!(urdf.contains("<mechanicalReduction>-100</mechanicalReduction>"), "{urdf}");
-    assert!(urdf.contains("<mechanicalReduction>2</mechanicalReduction>"), "{urdf}");
-}
-
 robot! {
     robot FromUrdf;
     topology: urdf("urdf/geared.urdf");
 }
 
 #[test]
-fn a_urdf_gives_ratio_offset_and_direction() {
+fn a_urdf_keeps_and_gives_ratio_offset_and_direction() {
+    let urdf = Geared::to_urdf();
+    for (name, value) in [("offset", "0.5"), ("mechanicalReduction", "-100"), ("mechanicalReduction", "2")] {
+        assert!(urdf.contains(&format!("<{name}>{value}</{name}>")), "{urdf}");
+    }
     let gear = |joint: &str| FromUrdf::TOPOLOGY.joint(joint).and_then(|joint| joint.transmission);
     assert_eq!(gear("arm"), Some(GEAR));
     assert_eq!(gear("slide"), Some(Transmission { reduction: 20.0, offset: 0.25, is_reversed: false }));
