@@ -19,13 +19,12 @@ robot! {
 
 #[test]
 fn a_filter_publishes_what_it_knows() {
-    let builder = Outputs::builder();
-    let plain = builder.subscribe(outputs::sensor::body::imu::plain);
-    let orientation = builder.subscribe(outputs::sensor::body::imu::madgwick::orientation);
-    let status = builder.subscribe(outputs::sensor::body::imu::madgwick::status);
-    let known_orientation = builder.subscribe(outputs::sensor::body::imu::mekf::orientation);
-    let known_status = builder.subscribe(outputs::sensor::body::imu::mekf::status);
-    let mut simulation = builder.simulate().unwrap();
+    let mut simulation = Outputs::builder().simulate().unwrap();
+    let plain = simulation.subscribe(outputs::sensor::body::imu::plain);
+    let orientation = simulation.subscribe(outputs::sensor::body::imu::madgwick::orientation);
+    let status = simulation.subscribe(outputs::sensor::body::imu::madgwick::status);
+    let known_orientation = simulation.subscribe(outputs::sensor::body::imu::mekf::orientation);
+    let known_status = simulation.subscribe(outputs::sensor::body::imu::mekf::status);
     let mut count = 0;
     while simulation.step() {
         for (plain, orientation) in plain.drain().zip(orientation.drain()) {

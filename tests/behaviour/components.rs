@@ -124,7 +124,7 @@ pub(crate) struct EchoOptions {
     pub(crate) tune: Option<fn(f64) -> Done>,
 }
 
-/// Without the addresses of its code: in another process, which replays a journal with it, they are others.
+/// Leaves out the addresses of its code, which are others in another process that replays a journal with it.
 impl Debug for EchoOptions {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> std::fmt::Result {
         formatter.debug_struct("EchoOptions").field("gain", &self.gain).finish_non_exhaustive()

@@ -78,19 +78,13 @@ fn a_command_that_hangs_is_not_started_for_ever_however_often_it_is_cancelled() 
         HERE.close("here");
         let running = stuck(|_| HERE.stuck("here"));
         let start = || running.command(ill::command::stuck, NoArguments);
-        let mut started = 0;
-        let refusal = loop {
-            match start() {
-                Ok(execution) => {
-                    HERE.wait_for(started + 1);
-                    execution.cancel();
-                }
-                Err(refusal) => break refusal,
-            }
-            started += 1;
-            assert!(started <= 256, "nobody refuses it");
-        };
-        assert_eq!((started, refusal.reason), (256, RefusalReason::Hanging));
+        for started in 1..=256 {
+            let execution = start().expect("nobody refuses it yet");
+            HERE.wait_for(started);
+            execution.cancel();
+        }
+        let refusal = start().map(drop).expect_err("256 hang");
+        assert_eq!(refusal.reason, RefusalReason::Hanging);
         let disarms = running.command(ill::command::disarm, NoArguments).expect("it is armed");
         assert_eq!(disarms.wait_timeout(PATIENCE), Some(Ok(())));
         HERE.open();

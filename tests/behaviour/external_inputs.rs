@@ -1,7 +1,6 @@
 //! Inputs at paths at which other code publishes.
 
 use crate::kit::*;
-use bb_core::event::{HealthState, Right};
 use bb_core::message::codec::{decode, encode_as_ros, from_json, to_json};
 use bb_core::payload::*;
 
@@ -149,8 +148,8 @@ fn a_component_may_take_the_place_of_other_code() -> Result<(), Failure> {
     Ok(())
 }
 
-/// From a file, which a replay reads without a publisher, of a run with a publisher outside and a controller that publishes. Runs on many
-/// threads are those of `tests/stress.rs`.
+/// Replay of a file, without a publisher, after a run with a publisher outside and a controller that publishes. Runs on many threads are
+/// those of `tests/stress.rs`.
 #[test]
 fn a_replay_takes_what_was_published_bit_for_bit() -> Result<(), Failure> {
     let mapping = || {

@@ -82,13 +82,10 @@ fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
         let builder = sensing::<FAILS>(Duration::from_millis(100));
         let faults = builder.subscribe(system::Faults);
         let robot = armed(builder);
-        let mut failed = 0;
-        while failed < 2 {
-            let fault = faults.recv_timeout(Duration::from_secs(20)).expect("it is reported");
-            if fault.message == "disarming failed: no answer" {
-                assert_eq!(fault.path, "sensor/base/source");
-                failed += 1;
-            }
+        let mut told = std::iter::from_fn(|| faults.recv_timeout(PATIENCE));
+        for _ in 0..2 {
+            let fault = told.find(|fault| fault.message == "disarming failed: no answer").expect("it is reported");
+            assert_eq!(fault.path, "sensor/base/source");
         }
         assert_eq!(robot.safety(), Safety::Armed, "a device that is unplugged is no danger");
         assert!(matches!(robot.disarm(), Err(DisarmError::Failed(errors)) if errors.len() >= 2));

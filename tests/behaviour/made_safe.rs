@@ -1,7 +1,6 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
 use crate::kit::*;
-use std::sync::mpsc::channel;
 
 /// Number of motors that turn.
 static TURNING: AtomicI32 = AtomicI32::new(0);
@@ -345,7 +344,7 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), F
     assert_eq!(robot.disarm(), Ok(()));
     // Both wait for the code that blocks.
     let live = robot.live();
-    let (begins, has_begun) = channel();
+    let (begins, has_begun) = mpsc::channel();
     let arms = std::thread::spawn(move || {
         let _ = begins.send(());
         live.arm()

@@ -9,7 +9,6 @@ mod transmissions;
 
 use crate::kit::*;
 use bb_core::LimitedQuantity;
-use bb_core::component::ActuatorError;
 use bb_core::payload::{ActuatorCommand, EndMotion, MotionEnd};
 use bb_core::run::Execution;
 use bb_estimators::motion::{

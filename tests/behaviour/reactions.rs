@@ -1,7 +1,6 @@
 //! Reactions: a condition on a field of a topic starts a command.
 
 use crate::kit::*;
-use bb_core::Stamped;
 use bb_core::component::{ReactionEvent, ReactionState};
 use bb_core::event::CommandEvent;
 
@@ -98,13 +97,12 @@ fn volts(voltage: f64) -> BatteryState {
 
 const REFUSED: &str = "`land` is refused: it is not allowed in the state `disarmed`";
 
-/// In a replay, from what a file holds, the same happens, with the same caller.
+/// Replays from what a file holds have the same events, with the same caller.
 #[test]
 fn a_command_starts_when_the_condition_has_held_by_the_stamps() -> Result<(), Failure> {
     type Case<'a> = (&'a str, bool, &'a [(i64, i64, f64)], &'a str, [u64; 2]);
     let disarmed = format!("fulfilled at 10; {REFUSED} at 30; {REFUSED} at 60");
     // Messages from a decisecond to another, each half second, and what happens at which.
-    const NAN: f64 = f64::NAN;
     const LOW: f64 = 10.0;
     const OK: f64 = 12.0;
     const CHATTER: &str = "fulfilled at 10; not fulfilled at 28; fulfilled at 30; started at 50";
@@ -117,7 +115,7 @@ fn a_command_starts_when_the_condition_has_held_by_the_stamps() -> Result<(), Fa
         ("once after `for`", true, &[(10, 35, LOW)], "fulfilled at 10; started at 30", [0, 0]),
         ("again after the end, 0.5 s later, and the cooldown of 3 s", true, &[(10, 70, LOW)], AGAIN, [0, 0]),
         ("chatter", true, &[(10, 25, LOW), (28, 28, OK), (30, 50, LOW)], CHATTER, [0, 0]),
-        ("NaN", true, &[(10, 25, LOW), (28, 28, NAN), (29, 29, NAN), (30, 50, LOW)], CHATTER, [2, 0]),
+        ("NaN", true, &[(10, 25, LOW), (28, 28, f64::NAN), (29, 29, f64::NAN), (30, 50, LOW)], CHATTER, [2, 0]),
         ("silence", true, &[(10, 20, LOW), (41, 61, LOW)], SILENCE, [0, 1]),
         ("silence from the start", true, &[(45, 50, OK)], "", [0, 1]),
         ("disarmed: refused, and tried again after the cooldown", false, &[(10, 65, LOW)], &disarmed, [0, 0]),

@@ -9,8 +9,7 @@ static CHANGED: AtomicU32 = AtomicU32::new(0);
 
 fn alone() -> MutexGuard<'static, ()> {
     let alone = one_at_a_time();
-    MADE.store(0, Ordering::SeqCst);
-    CHANGED.store(0, Ordering::SeqCst);
+    [&MADE, &CHANGED].into_iter().for_each(|number| number.store(0, Ordering::SeqCst));
     TURNS.store(false, Ordering::SeqCst);
     alone
 }

@@ -34,15 +34,11 @@ fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() {
     assert_eq!(timed(&slow), [(0, 100.0), (250, 101.0)]);
 }
 
-/// Forgets to say when to read it next.
-fn restless(_: u32, now: MonotonicTime) -> Read {
-    Ok(Reading::now(Number(0.0)).next_at(now))
-}
-
 #[test]
 fn a_sensor_that_stops_virtual_time_is_stopped_and_named() {
     let mut builder = Clockwork::builder();
-    builder.options(clockwork::sensor::base::odd).read = restless;
+    // It forgets to say when to read it next.
+    builder.options(clockwork::sensor::base::odd).read = |_, now| Ok(Reading::now(Number(0.0)).next_at(now));
     builder.options(clockwork::sensor::base::no_rate).count = 5;
     let mut simulation = builder.simulate().expect("it starts");
     simulation.run_to_end();
