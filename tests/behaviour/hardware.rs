@@ -1,11 +1,13 @@
 //! Hardware is made safe whatever state the robot is in, and what guards it is neither lost nor kept for ever.
 
 use crate::kit::*;
+use std::sync::LazyLock;
 
 static IS_ON: AtomicBool = AtomicBool::new(false);
 static FAILS: AtomicBool = AtomicBool::new(false);
 static IS_SKIPPED: AtomicBool = AtomicBool::new(false);
-static PORTS: AtomicU32 = AtomicU32::new(0);
+/// A port, which those have open that share it.
+static PORT: LazyLock<Arc<()>> = LazyLock::new(Arc::default);
 
 fn alone() -> MutexGuard<'static, ()> {
     let guard = one_at_a_time();
@@ -13,25 +15,9 @@ fn alone() -> MutexGuard<'static, ()> {
     guard
 }
 
-/// An open port.
-struct Port;
-
-impl Port {
-    fn open() -> Self {
-        PORTS.fetch_add(1, Ordering::SeqCst);
-        Self
-    }
-}
-
-impl Drop for Port {
-    fn drop(&mut self) {
-        PORTS.fetch_sub(1, Ordering::SeqCst);
-    }
-}
-
 /// Starts its motor as it is made; the callback that stops it sets a parameter, and may fail then.
 fn lidar(context: &ServiceContext) -> Result<Update, Fault> {
-    let (bus, port) = (context.bus().clone(), Port::open());
+    let (bus, port) = (context.bus().clone(), Arc::clone(&PORT));
     context.on_disarm(move || {
         let _ = (&port, bus.set_parameter("param/speed", 0.0));
         if FAILS.load(Ordering::SeqCst) {
@@ -122,7 +108,6 @@ fn a_callback_that_does_something_and_fails_does_so_in_a_replay() -> Result<(), 
 #[test]
 fn a_robot_that_has_ended_keeps_nothing_open() -> Result<(), Failure> {
     let _alone = alone();
-    let before = PORTS.load(Ordering::SeqCst);
     let kept = Arc::new(());
     for _ in 0..20 {
         let mut builder = Guarded::builder();
@@ -134,7 +119,7 @@ fn a_robot_that_has_ended_keeps_nothing_open() -> Result<(), Failure> {
         Guarded::builder().start()?.stop();
     }
     // Threads of a real run may still be on their way out.
-    let is_closed = || PORTS.load(Ordering::SeqCst) == before && Arc::strong_count(&kept) == 1;
+    let is_closed = || Arc::strong_count(&PORT) == 1 && Arc::strong_count(&kept) == 1;
     wait_until("nothing is open", is_closed);
     Ok(())
 }

@@ -4,13 +4,13 @@ use crate::joints::{Pixel, Spot, Spotter};
 use crate::kit::*;
 use bb_core::component::InputTransforms;
 
-/// Options of an estimator that counts its messages, at a gain, and fails at the message of this number.
+/// Options of an estimator that counts its messages and fails at the one of this number, with a gain that its journal shows.
 fn ramp<const FAILS_AT: u32>(gain: f64) -> EchoOptions {
     EchoOptions {
         gain,
-        keep: |context| {
+        init: |context| {
             context.request(Request::Timer(7, Duration::from_millis(15)));
-            0.0
+            Ok(())
         },
         input: |count, _| {
             *count += 1.0;
