@@ -359,13 +359,6 @@ impl<O: Options> HandleCall<Which> for Known<O> {
     }
 }
 
-/// Options of an estimator with a gain.
-#[derive(Clone, Debug, Options)]
-pub(crate) struct GainOptions {
-    #[option(default = 1.0)]
-    pub(crate) gain: f64,
-}
-
 /// Options of [`Counter`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct CounterOptions {

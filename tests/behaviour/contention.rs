@@ -14,11 +14,11 @@ pub(crate) struct Two<'a> {
 pub(crate) struct Ordered([f64; 2]);
 
 impl Estimator for Ordered {
-    type Options = GainOptions;
+    type Options = ScaleOptions;
     type Input = Two<'static>;
     type Output = Number;
 
-    fn init(_: GainOptions, _: &Context) -> Result<Self, Fault> {
+    fn init(_: ScaleOptions, _: &Context) -> Result<Self, Fault> {
         Ok(Self::default())
     }
 
@@ -32,7 +32,7 @@ impl Estimator for Ordered {
         Ok(Reply::emit(Number(two.first.0)))
     }
 
-    fn handle_options(&mut self, _: GainOptions, _: &Context) -> Result<(), Fault> {
+    fn handle_options(&mut self, _: ScaleOptions, _: &Context) -> Result<(), Fault> {
         Ok(())
     }
 }
@@ -61,7 +61,7 @@ robot! {
     link base {
         sensor a: External<Number>();
         sensor b: External<Number>();
-        estimator ordered: Ordered(gain = param::gain) {
+        estimator ordered: Ordered(factor = param::gain) {
             input first: sensor::base::a, driver;
             input second: sensor::base::b, optional;
         }
@@ -108,7 +108,7 @@ fn every_lost_message_is_counted_whatever_publishes_or_fails() {
                 casts += u64::from(running.cast(crowded::estimator::base::ordered, Ask).is_ok());
                 let _ = running.call(crowded::estimator::base::beside, Ask);
                 let _ = running.call(crowded::estimator::base::apart, Ask);
-                running.set_parameter(crowded::param::gain, f64::from(round)).expect("it is finite");
+                running.set_parameter(crowded::param::gain, f64::from(round % 1000)).expect("it is in range");
             }
         });
         let report = running.stop();

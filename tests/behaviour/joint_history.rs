@@ -64,8 +64,7 @@ fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen()
     assert_eq!(keeper.drain().count(), 0);
     let report = simulation.report();
     let keeper = report.estimator("estimator/base/keeper").expect("it is declared");
-    let drops = keeper.inputs[1].dropped(DropReason::NoTransform);
-    assert_eq!(drops, 1);
+    assert_eq!(keeper.inputs[1].dropped(DropReason::NoTransform), 1);
 }
 
 /// A message that is stamped ahead of the clock is asked for where nobody knows yet, and those that follow are older:

@@ -6,12 +6,15 @@ static HERE: Gate = Gate::new();
 
 const PANICS: f64 = -2.0;
 const HANGS: f64 = -1000.0;
+const IS_SLOW: f64 = 1e9;
 
 /// Adds up what an estimator gets, from the second of its creation on; some numbers make it fail.
 fn add(sum: &mut f64, number: f64) -> Replied {
     match number {
         PANICS => panic!("told to"),
         HANGS => HERE.pass("an adder"),
+        // Only the first time: the run from the journal must know it from there.
+        slow if slow >= IS_SLOW && !is_again() => std::thread::sleep(Duration::from_millis(5)),
         _ => {}
     }
     *sum += number;
@@ -250,5 +253,51 @@ fn what_did_not_fit_in_a_full_inbox_does_not_fit_again() {
         .expect("it is the same");
         let sum = report.estimator("sensor/base/number/sum").expect("it is declared");
         assert!(sum.inputs[0].dropped(DropReason::Overflow) >= 1500 - 1024);
+    });
+}
+
+/// A busy moment; `tests/stress.rs` has random days.
+#[test]
+fn everything_at_once_on_many_threads_is_the_same_again() {
+    fn each(rounds: u32, micros: u64, act: impl Fn(u32)) {
+        for round in 0..rounds {
+            act(round);
+            std::thread::sleep(Duration::from_micros(micros));
+        }
+    }
+    let run = |builder: Builder<Again>| {
+        let running = armed(builder);
+        let publish = |sensor, number| running.publish(sensor, running.clock().now(), Number(number));
+        std::thread::scope(|scope| {
+            let publish = &publish;
+            for (sensor, odd) in
+                [(again::sensor::base::number, IS_SLOW), (again::sensor::base::pan::encoder, PANICS)]
+            {
+                scope.spawn(move || {
+                    each(400, 450, |round| publish(sensor, if round % 40 == 20 { odd } else { f64::from(round) }))
+                });
+            }
+            scope.spawn(|| {
+                each(200, 1000, |round| {
+                    running.set_parameter(again::param::gain, f64::from(round % 7)).expect("it is finite");
+                    // The estimator may wait for its restart.
+                    let _ = running.cast(again::sensor::base::pan::encoder::position, Number(1.0));
+                })
+            });
+            // Commands are refused, or not, as its state has it.
+            each(60, 3000, |round| {
+                let drive = running.command(again::command::drive, Way { steps: 3, tunes: round % 2 == 0 });
+                drive.into_iter().filter(|_| round % 3 == 0).for_each(|drive| drive.cancel());
+                if round % 20 == 10 {
+                    let _ = (running.disarm(), running.arm());
+                }
+            });
+        });
+        Ok(running.stop())
+    };
+    alone_within(240, move || {
+        let (heard, report) = same_again(Again::builder, run).expect("it is the same");
+        assert!(count(&heard, "sensor/base/number/sum") > 300 && count(&heard, "param/gain") >= 200, "{report}");
+        assert!(count(&heard, "actuator/base/pan/servo") > 5 && count(&heard, "safety") > 4, "{report}");
     });
 }

@@ -50,7 +50,6 @@ mod reactions;
 mod real_time;
 mod replaced;
 mod replay;
-mod restarted_motors;
 mod restarts;
 mod rights;
 mod safety;

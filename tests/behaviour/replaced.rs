@@ -221,25 +221,16 @@ fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure
 /// A replay creates the estimators again, so it needs the same replacements with the same options.
 #[test]
 fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure> {
-    let mut builder = replaced(ramp::<4>(0.5))?;
-    let lines = journal(&mut builder);
-    let all = builder.subscribe_any(Select::Below("sensor"), None, overflow());
-    let mut simulation = builder.simulate()?;
-    simulation.run_until(at(100));
-    simulation.stop();
+    let builder = || replaced(ramp::<4>(0.5)).expect("it is declared");
+    same_again(builder, |builder| {
+        let mut simulation = builder.simulate()?;
+        simulation.run_until(at(100));
+        Ok(simulation.stop())
+    })?;
+    let mut first = builder();
+    let lines = journal(&mut first);
+    first.simulate()?;
     let entries = entries(&lines);
-    let numbers = |all: &DynamicSubscription| -> Vec<_> {
-        let number = |message: DynamicMessage| message.downcast::<Number>().map(|number| number.0);
-        all.drain().map(|message| (message.path(), message.stamp(), number(message))).collect()
-    };
-
-    let builder = replaced(ramp::<4>(0.5))?;
-    let again = builder.subscribe_any(Select::Below("sensor"), None, overflow());
-    let mut replay = builder.replay()?;
-    replay.play(entries.clone())?;
-    replay.stop();
-    assert_eq!(numbers(&all), numbers(&again));
-
     let refused = |builder: Builder<Bench>| builder.replay().map(|mut replay| replay.play(entries.clone()));
     let error = refused(Bench::builder())?.expect_err("the algorithm is another").to_string();
     assert!(error.contains("replacement of sensor/base/count/scaled"), "{error}");
