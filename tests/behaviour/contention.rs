@@ -202,8 +202,8 @@ fn a_robot_that_has_stopped_answers_whatever_it_is_asked() {
         assert!(live.cast(crowded::estimator::base::ordered, Ask).is_err());
         assert_eq!((live.arm(), live.disarm()), (Err(ArmError::Stopping), Ok(())));
         assert!(live.subscribe(crowded::sensor::base::a).recv().is_none());
-        let refused = live.set_parameter(crowded::param::gain, 2.0).expect_err("it would not be stored");
-        assert_eq!(refused.message, "the robot has stopped");
+        let refused = live.set_parameter(crowded::param::gain, 2.0);
+        assert_refused(refused, "param/gain is not set: the robot has stopped");
         assert_eq!(live.report(), report, "it was the last one");
     });
 }

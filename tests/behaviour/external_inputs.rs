@@ -216,11 +216,8 @@ fn data_by_path_is_the_typed_message_or_an_error() -> Result<(), Failure> {
     let mut simulation = Mapped::builder().simulate()?;
     simulation.run_until(at(7));
     let bus = simulation.bus();
-    typed_and_by_path(
-        &bus,
-        "sensor/base/imu",
-        Imu::new([0.1, -0.0, 1e-300].into(), [9.0, 0.1 + 0.2, -1.0].into()),
-    )?;
+    let imu = Imu::new([0.1, -0.0, 1e-300].into(), [9.0, 0.1 + 0.2, -1.0].into());
+    typed_and_by_path(&bus, "sensor/base/imu", imu)?;
     typed_and_by_path(&bus, "sensor/radio", Number(0.1 + 0.2))?;
     typed_and_by_path(&bus, "slam/height", Number(-1e300))?;
     typed_and_by_path(&bus, "own/range", range()?)

@@ -270,9 +270,8 @@ fn everything_at_once_on_many_threads_is_the_same_again() {
         let publish = |sensor, number| running.publish(sensor, running.clock().now(), Number(number));
         std::thread::scope(|scope| {
             let publish = &publish;
-            for (sensor, odd) in
-                [(again::sensor::base::number, IS_SLOW), (again::sensor::base::pan::encoder, PANICS)]
-            {
+            let sensors = [(again::sensor::base::number, IS_SLOW), (again::sensor::base::pan::encoder, PANICS)];
+            for (sensor, odd) in sensors {
                 scope.spawn(move || {
                     each(400, 450, |round| publish(sensor, if round % 40 == 20 { odd } else { f64::from(round) }))
                 });
