@@ -150,10 +150,11 @@ fn random_days_on_virtual_time_are_the_same_again() -> Result<(), Failure> {
 }
 
 #[test]
-#[ignore = "a million messages take half a minute"]
-fn long_a_run_of_a_million_messages_is_the_same_again() -> Result<(), Failure> {
-    let report = same_day(builder(10, u32::MAX), |builder| on_virtual_time(builder, 250_000))?;
-    assert!(report.topics.iter().map(|topic| topic.published).sum::<u64>() > 900_000);
+#[ignore = "so many messages take a minute"]
+fn long_a_run_of_half_a_million_messages_is_the_same_again() -> Result<(), Failure> {
+    let report = same_day(builder(10, u32::MAX), |builder| on_virtual_time(builder, 400_000))?;
+    let published: u64 = report.topics.iter().map(|topic| topic.published).sum();
+    assert!(published > 500_000, "{published}");
     Ok(())
 }
 

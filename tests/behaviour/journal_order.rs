@@ -49,7 +49,9 @@ robot! {
     link base {
         joint shoulder: fixed {
             link arm {
-                sensor number: External<Number>() { estimator echo: Echo(input = echo, go_on = how_many) { on_degraded: crawl; on_recovered: hurry; } }
+                sensor number: External<Number>() {
+                    estimator echo: Echo(input = echo, go_on = how_many) { on_degraded: crawl; on_recovered: hurry; }
+                }
                 estimator below: Echo(input = slow) { input number: sensor::base::shoulder::arm::number::echo; runs_on: worker; }
             }
         }
