@@ -43,5 +43,5 @@ pub mod __private {
     pub use crate::outputs::unknown::{NoField, UNKNOWN_INDEX, Unknown};
     pub use crate::sorted::Sorted;
     pub use crate::time::instant::nanos_of;
-    pub use crate::time::stopwatch::{Reading, Stopwatch};
+    pub use crate::time::stopwatch::Stopwatch;
 }

@@ -2,7 +2,7 @@
 
 use super::environment::{Environment, Mode};
 use crate::time::MonotonicTime;
-use bb_message::__private::{Reading, Stopwatch};
+use bb_message::__private::Stopwatch;
 use std::cell::Cell;
 
 /// The reads of the clock and of the counter in one turn. The clock is read once and the counter once per callback, since the end
@@ -19,12 +19,11 @@ pub(super) struct Timing {
 struct First {
     time: MonotonicTime,
     stopwatch: Stopwatch,
-    reading: Reading,
 }
 
-/// Beginning of a callback to be measured.
+/// Beginning of a callback to be measured, in nanoseconds since the first of the turn.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Begun(Reading);
+pub(super) struct Begun(i64);
 
 /// End and duration of a measured callback.
 pub(super) struct Measured {
@@ -34,18 +33,17 @@ pub(super) struct Measured {
 
 impl Timing {
     /// Begins a callback that is measured: when another one ended, if that was right before.
+    #[inline]
     pub(super) fn begin(&self, environment: &Environment) -> Begun {
         if let Some(ended) = self.ended.take() {
             return ended;
         }
         let clock = environment.clock();
         if let Some(first) = self.first.get() {
-            return Begun(first.stopwatch.read(clock));
+            return Begun(first.stopwatch.nanos(clock));
         }
-        let stopwatch = Stopwatch::start();
-        let first = First { time: clock.now(), stopwatch, reading: stopwatch.read(clock) };
-        self.first.set(Some(first));
-        Begun(first.reading)
+        self.first.set(Some(First { time: clock.now(), stopwatch: Stopwatch::start(clock) }));
+        Begun(0)
     }
 
     /// Records an event whose time is charged to no callback.
@@ -65,10 +63,9 @@ impl Timing {
         let clock = environment.clock();
         match self.first.get() {
             Some(first) if environment.mode() == Mode::Real => {
-                let ended = first.stopwatch.read(clock);
+                let ended = first.stopwatch.nanos(clock);
                 self.ended.set(Some(Begun(ended)));
-                let nanos = first.stopwatch.nanos_between(begun, ended);
-                Measured { end: first.time.plus_nanos(first.stopwatch.nanos_between(first.reading, ended)), nanos }
+                Measured { end: first.time.plus_nanos(ended), nanos: (ended - begun).max(0) }
             }
             _ => {
                 let nanos = virtual_nanos();

@@ -11,18 +11,39 @@ use std::time::{Duration, Instant};
 /// (a percent, if the machine was busy during calibration; a scale that is further off is not used). If a processor has no
 /// counter that runs at a constant rate, the crate `quanta` reads the system's clock.
 #[derive(Clone, Copy, Debug)]
-pub struct Stopwatch(Option<&'static quanta::Clock>);
-
-/// A reading of the stopwatch.
-#[derive(Clone, Copy, Debug)]
-pub enum Reading {
-    /// Ticks of the processor's counter.
-    Counter(u64),
-    /// Time of the clock.
+pub enum Stopwatch {
+    /// Counter of the processor, and what it read at the start.
+    Counter(&'static Counter, u64),
+    /// Time of the start, by the clock.
     Clock(MonotonicTime),
 }
 
-static COUNTER: OnceLock<quanta::Clock> = OnceLock::new();
+/// Counter of the processor, calibrated.
+#[derive(Debug)]
+pub struct Counter {
+    raw: quanta::Clock,
+    /// Nanoseconds of 2^[`SHIFT`] ticks.
+    scale: u64,
+}
+
+/// Fraction bits of [`Counter::scale`], which is rounded by less than a part in 10^9 with them.
+const SHIFT: u32 = 32;
+
+static COUNTER: OnceLock<Counter> = OnceLock::new();
+
+impl Counter {
+    fn new(raw: quanta::Clock) -> Self {
+        let scale = raw.delta_as_nanos(0, 1 << SHIFT);
+        Self { raw, scale }
+    }
+
+    /// Nanoseconds since it read `start`. Zero if it went back, as it may when a machine is suspended.
+    #[inline]
+    fn nanos_since(&self, start: u64) -> i64 {
+        let ticks = self.raw.raw().saturating_sub(start);
+        ((u128::from(ticks) * u128::from(self.scale)) >> SHIFT) as i64
+    }
+}
 
 impl Stopwatch {
     /// Calibrates the counter, unless done already: up to 200 ms of a busy machine and a pause of 50 ms. Until then, the clock is read.
@@ -31,36 +52,26 @@ impl Stopwatch {
         ONCE.call_once(|| {
             let counter = quanta::Clock::new();
             if is_right(&counter) {
-                COUNTER.get_or_init(|| counter);
+                COUNTER.get_or_init(|| Counter::new(counter));
             }
         });
     }
 
-    /// Chooses the counter, or the clock until the counter is calibrated.
+    /// Starts, by the counter or, until that is calibrated, by the clock.
     #[inline]
-    pub fn start() -> Self {
-        Self(COUNTER.get())
-    }
-
-    /// Reads the counter, or the clock if [`Self::start`] found no counter.
-    #[inline]
-    pub fn read(self, clock: &Clock) -> Reading {
-        match self.0 {
-            Some(counter) => Reading::Counter(counter.raw()),
-            None => Reading::Clock(clock.now()),
+    pub fn start(clock: &Clock) -> Self {
+        match COUNTER.get() {
+            Some(counter) => Self::Counter(counter, counter.raw.raw()),
+            None => Self::Clock(clock.now()),
         }
     }
 
-    /// The nanoseconds from `start` to `end`, both of this stopwatch. Zero if the counter went back, as it may when a
-    /// machine is suspended.
+    /// Nanoseconds since the start.
     #[inline]
-    pub fn nanos_between(self, start: Reading, end: Reading) -> i64 {
-        match (self.0, start, end) {
-            (Some(counter), Reading::Counter(start), Reading::Counter(end)) => {
-                i64::try_from(counter.delta_as_nanos(start, end)).unwrap_or(i64::MAX)
-            }
-            (_, Reading::Clock(start), Reading::Clock(end)) => end.nanos_since(start),
-            _ => 0,
+    pub fn nanos(self, clock: &Clock) -> i64 {
+        match self {
+            Self::Counter(counter, start) => counter.nanos_since(start),
+            Self::Clock(start) => clock.now().nanos_since(start),
         }
     }
 }
@@ -91,37 +102,36 @@ mod tests {
     use super::*;
 
     /// The counter of this process, once it is calibrated.
-    fn calibrated() -> &'static quanta::Clock {
+    fn calibrated() -> &'static Counter {
         let counter = quanta::Clock::new();
         assert!((0..20).any(|_| is_right(&counter)), "the scale is off");
-        COUNTER.get_or_init(|| counter)
+        COUNTER.get_or_init(|| Counter::new(counter))
     }
 
     #[test]
     fn a_duration_is_the_systems() {
         let clock = Clock::real();
-        for stopwatch in [Stopwatch(None), Stopwatch(Some(calibrated()))] {
+        let counter = calibrated();
+        for is_counted in [false, true] {
             for millis in [0, 1, 30, 300] {
                 let outer = Instant::now();
-                let start = stopwatch.read(&clock);
+                let stopwatch = if is_counted { Stopwatch::start(&clock) } else { Stopwatch::Clock(clock.now()) };
+                assert_eq!(matches!(stopwatch, Stopwatch::Counter(..)), is_counted);
                 let inner = Instant::now();
                 std::thread::sleep(Duration::from_millis(millis));
                 let shortest = inner.elapsed().as_nanos() as i64;
-                let measured = stopwatch.nanos_between(start, stopwatch.read(&clock));
+                let measured = stopwatch.nanos(&clock);
                 let longest = outer.elapsed().as_nanos() as i64;
                 // A busy machine distorts the scale by a percent or two.
                 let tolerance = 100 + longest / 20;
                 let is_right = shortest - tolerance <= measured && measured <= longest + tolerance;
-                assert!(is_right, "{measured} ns in {shortest} to {longest}: {stopwatch:?}");
+                assert!(is_right, "{measured} ns in {shortest} to {longest}: {counter:?}");
             }
         }
     }
 
     #[test]
     fn a_counter_that_goes_back_gives_zero() {
-        let stopwatch = Stopwatch(Some(calibrated()));
-        for (start, end) in [(u64::MAX, 0), (1, 0)] {
-            assert_eq!(stopwatch.nanos_between(Reading::Counter(start), Reading::Counter(end)), 0);
-        }
+        assert_eq!(Stopwatch::Counter(calibrated(), u64::MAX).nanos(&Clock::real()), 0);
     }
 }
