@@ -193,7 +193,6 @@ fn given(
     let turn = start.world_from_body.to_rotation_matrix().into_inner();
     let in_world = |covariance: Matrix3<f64>| turn * covariance * turn.transpose();
     let mut start = Start {
-        gyroscope_bias_deviation: 0.5 * AlignmentParams::default().largest_bias,
         position_covariance: known(state.pose.covariance, 0).unwrap_or(start.position_covariance),
         rotation_covariance: known(state.pose.covariance, 3).unwrap_or(start.rotation_covariance),
         velocity_covariance: known(state.twist.covariance, 0).map_or(start.velocity_covariance, in_world),
