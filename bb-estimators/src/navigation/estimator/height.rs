@@ -1,7 +1,8 @@
 //! Heights relative to the first barometer reading.
 
-use super::input::{Setup, deviation, place};
+use super::input::{Setup, place};
 use super::life::World;
+use super::measured::deviation;
 use crate::navigation::measurement::BarometricHeight;
 use crate::navigation::state::Estimate;
 use bb_core::payload::FluidPressure;

@@ -1,9 +1,8 @@
 //! Inputs of the declared filter, and the mounting of its sensors.
 
 use super::life::World;
-use super::measured::{in_body, told};
+use super::measured::{deviation, heading, in_body, told};
 use super::options::NavigationOptions;
-use crate::navigation::math::atan2;
 use crate::navigation::measurement::{
     AbsolutePose, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, MagneticHeading, RelativePose, isotropic,
 };
@@ -129,10 +128,9 @@ impl Setup {
 
     /// The heading of a pair of antennas.
     pub(super) fn gnss_heading(&self, orientation: &Orientation) -> GnssHeading {
-        let ahead = orientation.world_from_body * Vector3::x();
         let stated = told(orientation.covariance).map(|covariance| covariance[(2, 2)]);
         GnssHeading {
-            heading: atan2(ahead.y, ahead.x),
+            heading: heading(&orientation.world_from_body),
             deviation: deviation(stated, self.options.gnss_heading_deviation),
             baseline: rotation(self.gnss_heading.as_ref()) * Vector3::x(),
         }
@@ -202,9 +200,4 @@ pub(super) fn place(body_from_sensor: Option<&Isometry3<f64>>) -> Vector3<f64> {
 
 fn rotation(body_from_sensor: Option<&Isometry3<f64>>) -> UnitQuaternion<f64> {
     body_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation)
-}
-
-/// The square root of a variance, if it is given.
-pub(super) fn deviation(variance: Option<f64>, otherwise: f64) -> f64 {
-    variance.filter(|variance| *variance > 0.0).map_or(otherwise, f64::sqrt)
 }

@@ -43,6 +43,17 @@ pub(in crate::navigation) fn of_fix(deviation: f64) -> Matrix3<f64> {
     Matrix3::from_diagonal(&deviations.component_mul(&deviations))
 }
 
+/// The square root of a variance, if it is given.
+pub(in crate::navigation) fn deviation(variance: Option<f64>, otherwise: f64) -> f64 {
+    variance.filter(|variance| *variance > 0.0).map_or(otherwise, f64::sqrt)
+}
+
+/// The heading of the x axis, rad.
+pub(in crate::navigation) fn heading(world_from_body: &UnitQuaternion<f64>) -> f64 {
+    let ahead = world_from_body * Vector3::x();
+    ahead.y.atan2(ahead.x)
+}
+
 /// A covariance, if it carries information: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
 pub(in crate::navigation) fn told<const D: usize>(
     covariance: Option<SMatrix<f64, D, D>>,

@@ -90,10 +90,7 @@ fn running<S: States + Send + 'static, const N: usize>(
 ) -> Started {
     let options = &setup.options;
     let sensed = Sensed::<EskfFilter<S, N>>::new(options.params(), start, options.odometry_correlation)?;
-    let longest_s = options.longest_dead_reckoning;
-    let limits = Limits {
-        dead_reckoning_s: setup.has_positions().then_some(longest_s),
-        deviation: options.largest_deviation,
-    };
+    let dead_reckoning_s = setup.has_positions().then_some(options.longest_dead_reckoning);
+    let limits = Limits { dead_reckoning_s, deviation: options.largest_deviation };
     Ok(Box::new(Running::<_, STATES>::new(sensed, limits, frame)?))
 }

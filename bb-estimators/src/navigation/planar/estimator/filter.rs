@@ -24,11 +24,8 @@ pub(super) fn started(
 ) -> Result<Box<dyn Runs<Starting>>, Fault> {
     let options = &setup.options;
     let sensed = Sensed::<PlanarFilter>::new(options.params(), start, options.odometry_correlation)?;
-    let longest_s = options.longest_dead_reckoning;
-    let limits = Limits {
-        dead_reckoning_s: setup.has_positions().then_some(longest_s),
-        deviation: options.largest_deviation,
-    };
+    let dead_reckoning_s = setup.has_positions().then_some(options.longest_dead_reckoning);
+    let limits = Limits { dead_reckoning_s, deviation: options.largest_deviation };
     Ok(Box::new(Running::<_, STATES>::new(sensed, limits, frame)?))
 }
 

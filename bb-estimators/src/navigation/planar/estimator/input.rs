@@ -1,7 +1,7 @@
 //! Inputs of the declared filter, and the mounting of their sensors.
 
 use super::options::PlanarOptions;
-use crate::navigation::estimator::measured::told;
+use crate::navigation::estimator::measured::{deviation, heading, told};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::GnssPosition;
 use crate::navigation::numbers::UPRIGHT;
@@ -135,16 +135,11 @@ impl Setup {
         let body_from_sensor = self.body_from_orientation.unwrap_or_else(UnitQuaternion::identity);
         let world_from_body = orientation.world_from_body * body_from_sensor.inverse();
         let variance = orientation.covariance.map(|covariance| about_up(&orientation.world_from_body, &covariance));
-        let deviation =
-            variance.filter(|variance| *variance > 0.0).map_or(self.options.orientation_deviation, f64::sqrt);
-        PlanarHeading { heading: heading(&world_from_body), deviation }
+        PlanarHeading {
+            heading: heading(&world_from_body),
+            deviation: deviation(variance, self.options.orientation_deviation),
+        }
     }
-}
-
-/// The heading of the x axis, rad.
-pub(super) fn heading(world_from_body: &UnitQuaternion<f64>) -> f64 {
-    let ahead = world_from_body * Vector3::x();
-    ahead.y.atan2(ahead.x)
 }
 
 /// The variance about the vertical, from the covariance of a small rotation of the body, rad².

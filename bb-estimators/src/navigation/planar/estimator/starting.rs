@@ -1,10 +1,11 @@
 //! The start of the filter.
 
-use super::input::{PlanarInputs, Setup, heading};
+use super::input::{PlanarInputs, Setup};
 use super::report::PlanarStatus;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::course::Course;
 use crate::navigation::estimator::life::Starts;
+use crate::navigation::estimator::measured::heading;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::numbers::{
     CLEARLY, HEADING_BY_DEFINITION, LONGEST_START_NS, ORIGIN_DEVIATION, PLANAR_START_SPEED, START_SLIP,
