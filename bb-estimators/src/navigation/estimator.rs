@@ -1,32 +1,28 @@
 //! The error-state Kalman filter as an estimator to declare in `robot!`.
 
-pub(super) mod correlation;
 pub(super) mod course;
 mod filter;
-pub(super) mod fusing;
-pub(super) mod health;
 mod height;
 mod input;
 #[cfg(test)]
 mod laws;
+pub(super) mod life;
 pub(super) mod measured;
 mod options;
 mod output;
-pub(super) mod report;
-mod running;
+mod report;
 mod starting;
 mod states;
-pub(super) mod world;
 
 pub use course::Course;
 pub use input::NavigationInputs;
+pub use life::Verdicts;
 pub use options::NavigationOptions;
 pub use output::{NavigationOutput, NavigationOutputs};
-pub use report::{NavigationStatus, Verdicts};
+pub use report::NavigationStatus;
 
-use self::fusing::{Taken, doubted};
-use self::input::Mounting;
-use self::running::Core;
+use self::input::Setup;
+use self::life::Life;
 use self::starting::Starting;
 use super::state::{NAVIGATION, Navigation, States};
 use crate::params::Params as _;
@@ -166,16 +162,8 @@ use std::marker::PhantomData;
 /// limit in the options, and disagreement with the measurements.
 #[derive(Debug)]
 pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = NAVIGATION> {
-    options: NavigationOptions,
-    mounting: Mounting,
-    phase: Phase,
+    life: Life<Starting>,
     types: PhantomData<fn(S) -> O>,
-}
-
-#[derive(Debug)]
-enum Phase {
-    Starting(Box<Starting>),
-    Running(Box<dyn Core>),
 }
 
 impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator for EskfEstimator<O, S, N> {
@@ -191,35 +179,13 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
                 "`Optional::RelativeScale` needs `Optional::Keyframe`: the scale is that of poses relative to it"
             );
         }
-        let mounting = Mounting::of(context)?;
-        states::check::<S>(&mounting)?;
-        let phase = Phase::Starting(Box::new(Starting::new(&options, None)));
-        Ok(Self { options, mounting, phase, types: PhantomData })
+        let setup = Setup::new(options, context)?;
+        states::check::<S>(&setup)?;
+        Ok(Self { life: Life::new(setup), types: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
-        let sample = measured::sample(inputs.imu.message(), &self.mounting.link_from_imu.rotation);
-        let Self { options, mounting, phase, .. } = self;
-        match phase {
-            Phase::Starting(starting) => {
-                let start = starting.take(&sample, &inputs, options, mounting);
-                let reason = starting
-                    .takes_too_long()
-                    .then_some("it has neither lain still nor seen a course, and cannot start");
-                if let Some((start, world)) = start {
-                    *phase = Phase::Running(running::started::<S, N>(options, mounting, &start, world)?);
-                }
-                Ok(doubted(Reply::none(), reason))
-            }
-            Phase::Running(running) => {
-                let taken = running.take(&sample, &inputs, options, mounting);
-                let taken = running.judge(taken)?;
-                let reply = taken.reply(|| O::of(running.as_ref(), mounting));
-                if let Taken::Lost = taken {
-                    *phase = Phase::Starting(Box::new(Starting::new(options, running.frame())));
-                }
-                Ok(reply)
-            }
-        }
+        let sample = measured::sample(inputs.imu.message(), &self.life.setup.link_from_imu.rotation);
+        self.life.take(&sample, &inputs, states::started::<S, N>, O::of)
     }
 }

@@ -1,4 +1,15 @@
-//! The outcome of an update.
+//! A measurement compared with the estimate, and the outcome of an update with it.
+
+/// The gating quantities of a measurement, before it is fused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Judged {
+    /// Normalised innovation squared.
+    pub(super) nis: f64,
+    /// `-½ ln det S`.
+    pub(super) log_density: f64,
+    /// The first component of the whitened innovation.
+    pub(super) whitened: f64,
+}
 
 /// The outcome of an update.
 #[derive(Clone, Copy, Debug, PartialEq)]

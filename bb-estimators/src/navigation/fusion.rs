@@ -1,9 +1,9 @@
 //! Fusion of a linearised measurement, shared by all filters.
 
 use super::covariance::{Covariance, Innovation};
-use super::fused::Fused;
+use super::fused::{Fused, Judged};
 use super::refusal::Refusal;
-use super::stream::{Gate, Stream, Verdict};
+use super::stream::{Gate, Stream};
 
 /// Applies the gate of a stream to an innovation, and weakens what is far off.
 ///
@@ -17,17 +17,16 @@ pub(super) fn weighed<const N: usize>(
     innovation: &mut Innovation<'_>,
     gate: Gate,
 ) -> Result<Fused, Refusal> {
-    let (nis, dimension) = (innovation.nis(), innovation.dimension());
-    if nis.is_nan() {
+    let judged = Judged { nis: innovation.nis(), log_density: innovation.log_density(), whitened: 0.0 };
+    if judged.nis.is_nan() {
         return Err(Refusal::NonFinite);
     }
-    let Verdict { weight, limit, log_likelihood } = stream.weigh(nis, dimension, innovation.log_density(), gate)?;
-    if weight < 1.0 {
-        innovation.soften(weight);
+    let fused = stream.weigh(&judged, innovation.dimension(), gate)?;
+    if fused.weight < 1.0 {
+        innovation.soften(fused.weight);
         if !innovation.decompose(covariance.matrix().as_slice()) {
             return Err(Refusal::Noise);
         }
     }
-    let whitened = innovation.first_whitened();
-    Ok(Fused { nis, dimension, weight, limit, log_likelihood, whitened })
+    Ok(Fused { whitened: innovation.first_whitened(), ..fused })
 }

@@ -2,7 +2,7 @@
 
 use crate::navigation::chi_square::limit;
 use crate::navigation::consistency::Consistency;
-use crate::navigation::fused::Fused;
+use crate::navigation::fused::{Fused, Judged};
 use crate::navigation::math::sqrt;
 use crate::navigation::refusal::Refusal;
 use crate::params::params;
@@ -56,14 +56,6 @@ pub(crate) enum Gate {
     Closed,
     /// All measurements pass.
     Open,
-}
-
-/// Result of judging a measurement.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Verdict {
-    pub(crate) weight: f64,
-    pub(crate) limit: f64,
-    pub(crate) log_likelihood: f64,
 }
 
 /// The state that a filter keeps for one sensor.
@@ -122,13 +114,8 @@ impl Stream {
 
     /// Decides how a measurement is fused, or rejects it.
     #[inline(always)]
-    pub(crate) fn weigh(
-        &self,
-        nis: f64,
-        dimension: usize,
-        log_density: f64,
-        gate: Gate,
-    ) -> Result<Verdict, Refusal> {
+    pub(super) fn weigh(&self, judged: &Judged, dimension: usize, gate: Gate) -> Result<Fused, Refusal> {
+        let Judged { nis, log_density, whitened } = *judged;
         let log_likelihood = log_density - 0.5 * nis;
         let most = self.gate(dimension);
         if nis > most && matches!(gate, Gate::Closed) {
@@ -136,7 +123,7 @@ impl Stream {
         }
         let huber = self.huber.get(dimension).copied().unwrap_or_else(|| limit(dimension, self.params.robust));
         let weight = if nis > huber { sqrt(huber / nis) } else { 1.0 };
-        Ok(Verdict { weight, limit: most, log_likelihood })
+        Ok(Fused { nis, dimension, weight, limit: most, log_likelihood, whitened })
     }
 
     #[inline]

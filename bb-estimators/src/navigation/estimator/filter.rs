@@ -1,37 +1,23 @@
-//! The filter with a stream per sensor.
+//! The filter, with its sensors and outputs.
 
-use super::correlation::Correlation;
-use super::fusing::Sensing;
-use super::health::{Sight, Watch, largest_deviation};
-use super::input::keyframe_at;
-use super::options::NavigationOptions;
-use crate::navigation::copies::{Copies, Ways};
-use crate::navigation::eskf::{EskfFilter, Start};
+use super::height::of_pressure;
+use super::input::{NavigationInputs, Setup, keyframe_at};
+use super::life::{Running, Sensed, Sensing, World, new_of};
+use super::report::{Motion, NavigationStatus, status_of};
+use super::starting::Starting;
+use crate::navigation::eskf::EskfFilter;
 use crate::navigation::fused::Fused;
-use crate::navigation::history::Replayed;
-use crate::navigation::math::sqrt;
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, MagneticHeading,
     RelativePose,
 };
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, NAVIGATION, Optional, POSITION, States, offset};
-use crate::navigation::stream::{Counts, Stream};
-use bb_core::Fault;
-use nalgebra::Isometry3;
-
-/// Copies of the filter, and a stream for each sensor.
-#[derive(Clone, Debug)]
-pub(super) struct Filter<S: States, const N: usize> {
-    copies: Copies<EskfFilter<S, N>>,
-    /// Indexed by [`Measured::sensor`].
-    streams: [Stream; SENSORS],
-    correlation: Correlation,
-}
+use crate::navigation::state::{NAVIGATION, POSITION, States};
+use bb_core::payload::Odometry;
 
 /// A measurement from one of the sensors.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Measured {
+pub(in crate::navigation) enum Measured {
     Gnss(GnssPosition),
     GnssVelocity(GnssVelocity),
     GnssHeading(GnssHeading),
@@ -43,98 +29,38 @@ pub(super) enum Measured {
     Pressure(BarometricHeight),
 }
 
-/// The number of sensors, each with a stream.
-const SENSORS: usize = 8;
-const NAMES: [&str; SENSORS] =
-    ["gnss", "odometry", "pose", "relative", "magnetic_field", "pressure", "gnss_velocity", "gnss_heading"];
+impl<S: States + Send, const N: usize> Sensing for EskfFilter<S, N> {
+    type Starting = Starting;
+    type Measured = Measured;
 
-impl Measured {
-    fn sensor(&self) -> usize {
-        match self {
-            Self::Gnss(_) => 0,
-            Self::Odometry(_) => 1,
-            Self::Pose(_) => 2,
-            Self::Relative(..) => 3,
-            Self::MagneticField(_) => 4,
-            Self::Pressure(_) => 5,
-            Self::GnssVelocity(_) => 6,
-            Self::GnssHeading(_) => 7,
+    const NAMES: &'static [&'static str] =
+        &["gnss", "odometry", "pose", "relative", "magnetic_field", "pressure", "gnss_velocity", "gnss_heading"];
+
+    fn sensor(measured: &Measured) -> usize {
+        match measured {
+            Measured::Gnss(_) => 0,
+            Measured::Odometry(_) => 1,
+            Measured::Pose(_) => 2,
+            Measured::Relative(..) => 3,
+            Measured::MagneticField(_) => 4,
+            Measured::Pressure(_) => 5,
+            Measured::GnssVelocity(_) => 6,
+            Measured::GnssHeading(_) => 7,
         }
     }
-}
 
-impl<S: States, const N: usize> Filter<S, N> {
-    pub(super) fn new(options: &NavigationOptions, start: &Start) -> Result<Self, Fault> {
-        let mut copies = Copies::new(options.params(), Ways { noise: true, scale: true })?;
-        copies.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
-        let stream = Stream::default();
-        let correlation = Correlation::new(options.odometry_correlation);
-        Ok(Self { copies, streams: [stream; SENSORS], correlation })
-    }
-
-    pub(super) fn copies(&self) -> &Copies<EskfFilter<S, N>> {
-        &self.copies
-    }
-
-    pub(super) fn eskf(&self) -> &EskfFilter<S, N> {
-        self.copies.best()
-    }
-
-    pub(super) fn estimate(&self) -> Option<&Estimate<N>> {
-        self.copies.estimate()
-    }
-
-    /// Standard deviation of the horizontal position in its least certain direction, m.
-    pub(super) fn horizontal_deviation(&self) -> f64 {
-        let covariance = self.eskf().covariance();
-        let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
-        largest_deviation(of(0, 0), of(0, 1), of(1, 1))
-    }
-
-    /// Standard deviation of an optional scalar state; 0 if it is not a state.
-    pub(super) fn deviation(&self, state: Optional) -> f64 {
-        offset::<S>(state).map_or(0.0, |index| sqrt(self.eskf().covariance()[(index, index)]))
-    }
-
-    /// Counts of the measurements by result, in the order of [`NAMES`].
-    pub(super) fn counts(&self) -> [&Counts; SENSORS] {
-        self.streams.each_ref().map(Stream::counts)
-    }
-
-    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
-        self.copies.move_world(new_from_old)
-    }
-
-    fn odometry(&mut self, own: &BodyVelocity) -> Result<Fused, Refusal> {
-        let now_ns = self.estimate().ok_or(Refusal::NotStarted)?.time_ns;
-        let correlated = BodyVelocity { deviations: own.deviations * self.correlation.factor(now_ns), ..*own };
-        self.copies.update_correlated(&mut self.streams[1], own, &correlated)
-    }
-}
-
-impl<S: States, const N: usize> Replayed for Filter<S, N> {
-    type Filter = Copies<EskfFilter<S, N>>;
-    type Measurement = Measured;
-
-    fn filter(&self) -> &Copies<EskfFilter<S, N>> {
-        &self.copies
-    }
-
-    fn filter_mut(&mut self) -> &mut Copies<EskfFilter<S, N>> {
-        &mut self.copies
-    }
-
-    fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
-        if let Measured::Odometry(velocity) = measured {
-            return self.odometry(velocity);
-        }
-        let Self { copies, streams, .. } = self;
-        let stream = &mut streams[measured.sensor()];
+    fn correct(sensed: &mut Sensed<Self>, measured: &Measured) -> Result<Fused, Refusal> {
+        let Sensed { copies, streams, correlation } = sensed;
+        let stream = &mut streams[Self::sensor(measured)];
         match measured {
             Measured::Gnss(fix) => copies.update_fix(stream, fix),
             Measured::GnssVelocity(velocity) => copies.update(stream, velocity),
             Measured::GnssHeading(heading) => copies.update(stream, heading),
-            Measured::Odometry(velocity) => copies.update(stream, velocity),
+            Measured::Odometry(own) => {
+                let now_ns = copies.estimate().ok_or(Refusal::NotStarted)?.time_ns;
+                let deviations = own.deviations * correlation.factor(now_ns);
+                copies.update_correlated(stream, own, &BodyVelocity { deviations, ..*own })
+            }
             Measured::Pose(pose) => copies.update_position(stream, pose),
             Measured::Relative(relative, end_ns) => {
                 let result = copies.update(stream, relative);
@@ -146,15 +72,69 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
             Measured::Pressure(height) => copies.update(stream, height),
         }
     }
-}
 
-impl<S: States, const N: usize> Sensing for Filter<S, N> {
-    fn sensor(measured: &Measured) -> &'static str {
-        NAMES[measured.sensor()]
+    fn fuse<const STATES: usize>(
+        running: &mut Running<Self, STATES>,
+        inputs: &NavigationInputs<'_>,
+        setup: &Setup,
+    ) -> Result<(), Refusal> {
+        if let Some((time_ns, fix)) = new_of(inputs.gnss)
+            && let Some(measured) = setup.fix(fix, &running.world)
+        {
+            running.fuse(time_ns, Measured::Gnss(measured));
+        }
+        if let Some((time_ns, twist)) = new_of(inputs.gnss_velocity) {
+            running.fuse(time_ns, Measured::GnssVelocity(setup.gnss_velocity(twist)));
+        }
+        if let Some((time_ns, orientation)) = new_of(inputs.gnss_heading) {
+            running.fuse(time_ns, Measured::GnssHeading(setup.gnss_heading(orientation)));
+        }
+        if let Some((time_ns, odometry)) = new_of(inputs.odometry) {
+            running.fuse(time_ns, Measured::Odometry(setup.velocity(odometry)));
+        }
+        if let Some((time_ns, pose)) = new_of(inputs.pose) {
+            running.fuse(time_ns, Measured::Pose(setup.absolute_pose(pose, &running.world)));
+        }
+        if let Some((_, relative)) = new_of(inputs.relative) {
+            let end_ns = relative.end.as_nanos();
+            running.fuse(end_ns, Measured::Relative(setup.relative_pose(relative), end_ns));
+        }
+        if let Some((time_ns, field)) = new_of(inputs.magnetic_field) {
+            running.fuse(time_ns, Measured::MagneticField(setup.magnetic_heading(field)));
+        }
+        if let Some((time_ns, pressure)) = new_of(inputs.pressure)
+            && let Some(at) = running.past.now().copies.estimate()
+            && let Some(height) = of_pressure(pressure, at, &mut running.world, setup)
+        {
+            running.fuse(time_ns, Measured::Pressure(height));
+        }
+        if running.has_moved() {
+            // The next reading becomes the barometer's reference.
+            running.world.pressure = None;
+        }
+        let mut world = running.world;
+        if let Some(at) = running.now().copies.estimate()
+            && let Some(new_from_old) = world.moves_on(&at.position)
+        {
+            let mut sensed = running.now().clone();
+            sensed.copies.move_world(&new_from_old)?;
+            // The history belongs to the old world.
+            running.past.restart(sensed)?;
+            running.world = world;
+        }
+        Ok(())
+    }
+
+    fn odometry(&self, world: &World, setup: &Setup) -> Option<Odometry> {
+        Some(Motion::of(self)?.of_link(&setup.link(), &world.first_from_frame))
+    }
+
+    fn status(sensed: &Sensed<Self>, world: &World) -> Option<NavigationStatus> {
+        status_of(sensed, world)
     }
 
     fn is_sound(&self) -> bool {
-        let variances = self.eskf().covariance().diagonal();
+        let variances = self.covariance().diagonal();
         self.estimate().is_none_or(|estimate| {
             let numbers =
                 estimate.position.iter().chain(&estimate.velocity).chain(estimate.world_from_body.coords.iter());
@@ -163,23 +143,16 @@ impl<S: States, const N: usize> Sensing for Filter<S, N> {
         })
     }
 
-    fn elsewhere(&self) -> Option<f64> {
-        self.copies.elsewhere()
+    fn horizontal(&self) -> [f64; 3] {
+        [(0, 0), (0, 1), (1, 1)].map(|(i, j)| self.covariance()[(POSITION + i, POSITION + j)])
     }
 
     fn resets(&self) -> u32 {
-        self.eskf().resets()
+        self.resets()
     }
 
-    fn watched(&self, watch: &mut Watch) -> Option<&'static str> {
-        watch.look(&Sight {
-            now_ns: self.estimate()?.time_ns,
-            counts: &self.counts(),
-            resets: self.resets(),
-            dead_reckoning_s: self.eskf().dead_reckoning_s(),
-            deviation: self.horizontal_deviation(),
-            heading_deviation: self.copies.heading_deviation(),
-        })
+    fn dead_reckoning_s(&self) -> f64 {
+        self.dead_reckoning_s()
     }
 }
 
@@ -187,7 +160,7 @@ impl<S: States, const N: usize> Sensing for Filter<S, N> {
 mod tests {
     use super::*;
     use crate::navigation::History;
-    use crate::navigation::eskf::ImuMean;
+    use crate::navigation::eskf::{EskfParams, ImuMean, Start};
     use crate::navigation::state::Navigation;
     use nalgebra::{UnitQuaternion, Vector3};
 
@@ -196,11 +169,11 @@ mod tests {
     fn a_divided_gap_is_counted() {
         let (rest, level) = (Vector3::zeros(), UnitQuaternion::identity());
         let start = Start::at(0, (rest, 2.0), (rest, 0.5), (level, 0.1));
-        let filter = Filter::<Navigation, NAVIGATION>::new(&NavigationOptions::default(), &start).unwrap();
-        let mut history = History::<_, 10, 10, 2>::new(filter, 90_000_000).unwrap();
+        let sensed = Sensed::<EskfFilter<Navigation, NAVIGATION>>::new(EskfParams::default(), &start, 1.0).unwrap();
+        let mut history = History::<_, 10, 10, 2>::new(sensed, 90_000_000).unwrap();
         history.update(90_000_000, &Measured::Gnss(GnssPosition::new(rest, 1.0, 2.0))).unwrap();
         let specific_force = Vector3::new(0.0, 0.0, 9.8);
         history.propagate(&ImuMean { time_ns: 180_000_000, angular_velocity: rest, specific_force }).unwrap();
-        assert_eq!(history.now().eskf().gaps(), 2);
+        assert_eq!(history.now().best().gaps(), 2);
     }
 }

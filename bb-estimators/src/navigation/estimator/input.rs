@@ -1,10 +1,10 @@
 //! Inputs of the declared filter, and the mounting of its sensors.
 
-use super::measured::told;
+use super::life::World;
+use super::measured::{deviation, heading, in_body, told};
 use super::options::NavigationOptions;
-use crate::navigation::math::atan2;
 use crate::navigation::measurement::{
-    BodyVelocity, GnssHeading, GnssVelocity, MagneticHeading, RelativePose, isotropic,
+    AbsolutePose, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, MagneticHeading, RelativePose, isotropic,
 };
 use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Orientation, Pose, Twist};
 use bb_core::{Context, Fault, Input, Inputs};
@@ -37,11 +37,12 @@ pub struct NavigationInputs<'a> {
     pub start: Option<Input<'a, Odometry>>,
 }
 
-/// Poses of the sensors. `None` for inputs that the robot does not declare.
+/// Options, and the poses of the sensors: `None` for inputs that the robot does not declare.
 ///
 /// The filter's body frame has the axes of the link and its origin at the IMU.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Mounting {
+pub(in crate::navigation) struct Setup {
+    pub(super) options: NavigationOptions,
     pub(super) link_from_imu: Isometry3<f64>,
     pub(super) gnss: Option<Isometry3<f64>>,
     pub(super) gnss_velocity: Option<Isometry3<f64>>,
@@ -53,17 +54,13 @@ pub(super) struct Mounting {
     pub(super) pressure: Option<Isometry3<f64>>,
 }
 
-impl Mounting {
+impl Setup {
     /// Reads the mounting that the robot declares.
-    pub(super) fn of(context: &Context) -> Result<Self, Fault> {
+    pub(super) fn new(options: NavigationOptions, context: &Context) -> Result<Self, Fault> {
         let link_from_imu = context.frame_from_driver()?;
-        let of_body = |sensor: Isometry3<f64>| {
-            let from_imu = sensor.translation.vector - link_from_imu.translation.vector;
-            Isometry3::from_parts(from_imu.into(), sensor.rotation)
-        };
-        // `None` for inputs that the robot does not declare.
-        let optional = |name: &str| context.frame_from_input(name).ok().map(of_body);
+        let optional = |input: &str| in_body(context, &link_from_imu, input);
         Ok(Self {
+            options,
             link_from_imu,
             gnss: optional("gnss"),
             gnss_velocity: optional("gnss_velocity"),
@@ -107,31 +104,42 @@ impl Mounting {
         -self.link_from_imu.translation.vector
     }
 
+    /// A fix as a measurement. `None` if it has no position.
+    pub(super) fn fix(&self, fix: &GnssFix, world: &World) -> Option<GnssPosition> {
+        GnssPosition::of_fix(fix, &world.frame?, self.antenna(), self.options.gnss_deviation)
+    }
+
+    /// A pose in the outputs' world as a measurement.
+    pub(super) fn absolute_pose(&self, pose: &Pose, world: &World) -> AbsolutePose {
+        let body_from_sensor = self.pose.unwrap_or_else(Isometry3::identity);
+        AbsolutePose::of_pose(pose, &body_from_sensor, self.options.pose_deviation)
+            .moved(&world.first_from_frame.inverse())
+    }
+
     /// The velocity of a receiver's antenna.
-    pub(super) fn gnss_velocity(&self, twist: &Twist, options: &NavigationOptions) -> GnssVelocity {
+    pub(super) fn gnss_velocity(&self, twist: &Twist) -> GnssVelocity {
         let stated = twist.covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).into_owned());
         GnssVelocity {
             velocity: twist.linear,
-            covariance: told(stated).unwrap_or_else(|| isotropic(options.gnss_velocity_deviation)),
+            covariance: told(stated).unwrap_or_else(|| isotropic(self.options.gnss_velocity_deviation)),
             lever_arm: place(self.gnss_velocity.as_ref()),
         }
     }
 
     /// The heading of a pair of antennas.
-    pub(super) fn gnss_heading(&self, orientation: &Orientation, options: &NavigationOptions) -> GnssHeading {
-        let ahead = orientation.world_from_body * Vector3::x();
+    pub(super) fn gnss_heading(&self, orientation: &Orientation) -> GnssHeading {
         let stated = told(orientation.covariance).map(|covariance| covariance[(2, 2)]);
         GnssHeading {
-            heading: atan2(ahead.y, ahead.x),
-            deviation: deviation(stated, options.gnss_heading_deviation),
+            heading: heading(&orientation.world_from_body),
+            deviation: deviation(stated, self.options.gnss_heading_deviation),
             baseline: rotation(self.gnss_heading.as_ref()) * Vector3::x(),
         }
     }
 
     /// The velocity in an odometry.
-    pub(super) fn velocity(&self, odometry: &Odometry, options: &NavigationOptions) -> BodyVelocity {
-        let sideways = options.sideways_deviation;
-        let least = Vector3::new(options.odometry_deviation, sideways, 2.0 * sideways);
+    pub(super) fn velocity(&self, odometry: &Odometry) -> BodyVelocity {
+        let sideways = self.options.sideways_deviation;
+        let least = Vector3::new(self.options.odometry_deviation, sideways, 2.0 * sideways);
         let stated = |i: usize| odometry.twist.covariance.map(|covariance| covariance[(i, i)]);
         BodyVelocity {
             velocity: odometry.twist.linear,
@@ -142,11 +150,11 @@ impl Mounting {
     }
 
     /// The heading from a magnetic field.
-    pub(super) fn magnetic_heading(&self, field: &MagneticField, options: &NavigationOptions) -> MagneticHeading {
+    pub(super) fn magnetic_heading(&self, field: &MagneticField) -> MagneticHeading {
         MagneticHeading {
             field: rotation(self.magnetic_field.as_ref()) * field.magnetic_field,
-            declination: options.declination,
-            deviation: options.magnetic_deviation,
+            declination: self.options.declination,
+            deviation: self.options.magnetic_deviation,
         }
     }
 
@@ -154,11 +162,7 @@ impl Mounting {
     ///
     /// The scale applies to the translation of the sensor. Where the body rotates, part of the lever arm is not scaled. This is
     /// neglected.
-    pub(super) fn relative_pose(
-        &self,
-        relative: &payload::RelativePose,
-        options: &NavigationOptions,
-    ) -> RelativePose {
+    pub(super) fn relative_pose(&self, relative: &payload::RelativePose) -> RelativePose {
         let body_from_sensor = rotation(self.relative.as_ref());
         let lever_arm = place(self.relative.as_ref());
         let start_from_end = body_from_sensor * relative.start_from_end * body_from_sensor.inverse();
@@ -172,7 +176,7 @@ impl Mounting {
                 // Given in the frame at the start. The filter expects it in the body frame at the end.
                 (turned(start_from_end.inverse() * body_from_sensor, 0), turned(body_from_sensor, 3))
             }
-            None => (isotropic(options.relative_deviation), isotropic(0.1 * options.relative_deviation)),
+            None => (isotropic(self.options.relative_deviation), isotropic(0.1 * self.options.relative_deviation)),
         };
         RelativePose {
             keyframe: keyframe_at(relative.start.as_nanos()),
@@ -196,9 +200,4 @@ pub(super) fn place(body_from_sensor: Option<&Isometry3<f64>>) -> Vector3<f64> {
 
 fn rotation(body_from_sensor: Option<&Isometry3<f64>>) -> UnitQuaternion<f64> {
     body_from_sensor.map_or(UnitQuaternion::identity(), |sensor| sensor.rotation)
-}
-
-/// The square root of a variance, if it is given.
-pub(super) fn deviation(variance: Option<f64>, otherwise: f64) -> f64 {
-    variance.filter(|variance| *variance > 0.0).map_or(otherwise, f64::sqrt)
 }

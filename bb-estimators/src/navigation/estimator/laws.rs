@@ -1,12 +1,11 @@
 //! Laws of the filter that `Eskf` runs: copies with their streams, through a history, on random drives of a car.
 
-use super::filter::{Filter, Measured};
-use super::fusing::Fusing;
-use super::health::Limits;
+use super::filter::Measured;
 use super::input::keyframe_at;
+use super::life::{Limits, Running, Sensed};
 use super::options::NavigationOptions;
 use crate::navigation::copies::tests::Car;
-use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::eskf::{EskfFilter, ImuMean, Start};
 use crate::navigation::measurement::{BarometricHeight, GnssHeading, GnssPosition, GnssVelocity, RelativePose};
 use crate::navigation::nees;
 use crate::navigation::noise::Noise;
@@ -18,12 +17,16 @@ use proptest::prelude::*;
 const STEP_NS: i64 = 20_000_000;
 const STATES: usize = 8;
 
-type OfFixes = Fusing<Filter<Aided, { Aided::DIMENSION }>, STATES>;
-type OfAll = Fusing<Filter<Complete, { Complete::DIMENSION }>, STATES>;
+type OfFixes = Running<EskfFilter<Aided, { Aided::DIMENSION }>, STATES>;
+type OfAll = Running<EskfFilter<Complete, { Complete::DIMENSION }>, STATES>;
 
-fn fusing<S: States, const N: usize>(options: &NavigationOptions, start: &Start) -> Fusing<Filter<S, N>, STATES> {
+fn running<S: States + Send, const N: usize>(
+    options: &NavigationOptions,
+    start: &Start,
+) -> Running<EskfFilter<S, N>, STATES> {
     let limits = Limits { dead_reckoning_s: None, deviation: 1e6 };
-    Fusing::new(Filter::new(options, start).unwrap(), limits).unwrap()
+    let sensed = Sensed::new(options.params(), start, options.odometry_correlation).unwrap();
+    Running::new(sensed, limits, None).unwrap()
 }
 
 /// Mean NEES of the position of one drive, after half a minute, with sensors whose noise is what their data sheets say: an IMU of a random
@@ -55,13 +58,13 @@ fn nees_of_a_drive(seed: u64) -> f64 {
             (turn * car.world_from_imu(), 0.02),
         )
     };
-    let mut fusing: OfFixes = fusing(&options, &start);
+    let mut running: OfFixes = running(&options, &start);
     let (mut way, mut waiting) = (vec![car.position], Vec::new());
     let (mut sum, mut count) = (0.0, 0.0);
     for step in 1..=100 * 50_i64 {
         let sample = car.drive();
         way.push(car.position);
-        fusing.past.propagate(&sample).unwrap();
+        running.past.propagate(&sample).unwrap();
         if step % apart == 0 && step > 50 {
             // Between two samples, it is as good as straight on.
             let ahead = way[way.len() - 1] + car.velocity() * -delay_s;
@@ -73,14 +76,14 @@ fn nees_of_a_drive(seed: u64) -> f64 {
         }
         waiting.retain(|(arrives, fix)| {
             if *arrives == step {
-                fusing.fuse((step - late) * STEP_NS, Measured::Gnss(*fix));
+                running.fuse((step - late) * STEP_NS, Measured::Gnss(*fix));
             }
             *arrives != step
         });
         if step > 30 * 50 && step % 50 == 0 {
-            let now = fusing.now();
-            let error = now.estimate().unwrap().position - car.position;
-            let covariance = now.eskf().covariance().fixed_view::<3, 3>(POSITION, POSITION).into_owned();
+            let now = running.now();
+            let error = now.copies.estimate().unwrap().position - car.position;
+            let covariance = now.best().covariance().fixed_view::<3, 3>(POSITION, POSITION).into_owned();
             sum += nees(&error, &covariance).unwrap();
             count += 1.0;
         }
@@ -123,11 +126,11 @@ fn measured(kind: usize, car: &Car, off: f64, since_ns: i64, at_ns: i64) -> Meas
 /// that follows them.
 fn driven(seed: u64, taken: &[(i64, i64, usize, f64)], delayed: i64) -> OfAll {
     let mut car = Car::new(seed, [1e-3, 1e-2], 0.4);
-    let mut fusing: OfAll = fusing(&NavigationOptions::default(), &car.start(4.0));
+    let mut running: OfAll = running(&NavigationOptions::default(), &car.start(4.0));
     let (last, mut since_ns, mut waiting) = (300, 0, Vec::new());
     for step in 1..=last {
         let sample = car.drive();
-        fusing.past.propagate(&sample).unwrap();
+        running.past.propagate(&sample).unwrap();
         for (at_ns, delay, kind, off) in taken.iter().filter(|(at_ns, ..)| (at_ns + STEP_NS - 1) / STEP_NS == step)
         {
             let arrives = (step + delayed * delay).min(last);
@@ -135,11 +138,11 @@ fn driven(seed: u64, taken: &[(i64, i64, usize, f64)], delayed: i64) -> OfAll {
             since_ns = if *kind == 4 { *at_ns } else { since_ns };
         }
         for (_, at_ns, measured) in waiting.extract_if(.., |(arrives, ..)| *arrives <= step) {
-            fusing.fuse(at_ns, measured);
+            running.fuse(at_ns, measured);
         }
     }
-    assert_eq!(fusing.past.arrivals().too_old, 0);
-    fusing
+    assert_eq!(running.past.arrivals().too_old, 0);
+    running
 }
 
 /// Fixes of a drive in a world that is turned and moved: the errors in that of the car.
@@ -152,16 +155,16 @@ fn errors_in(seed: u64, turn: &UnitQuaternion<f64>, shift: &Vector3<f64>) -> Vec
         world_from_body: turn * start.world_from_body,
         ..start
     };
-    let mut fusing: OfFixes = fusing(&NavigationOptions::default(), &start);
+    let mut running: OfFixes = running(&NavigationOptions::default(), &start);
     let mut errors = Vec::new();
     for step in 1..=30 * 50 {
         let sample: ImuMean = car.drive();
-        fusing.past.propagate(&sample).unwrap();
+        running.past.propagate(&sample).unwrap();
         if step % 50 == 0 {
             let fix = car.fix();
             let fix = GnssPosition { position: turn * fix.position + shift, ..fix };
-            fusing.fuse(car.time_ns, Measured::Gnss(fix));
-            let at = fusing.now().estimate().unwrap();
+            running.fuse(car.time_ns, Measured::Gnss(fix));
+            let at = running.now().copies.estimate().unwrap();
             let attitude = turn.inverse() * at.world_from_body;
             errors.push([
                 turn.inverse() * (at.position - shift) - car.position,

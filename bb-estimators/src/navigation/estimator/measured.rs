@@ -5,8 +5,9 @@ use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, isotropic};
 use crate::navigation::numbers::UNKNOWN_HEIGHT;
+use bb_core::Context;
 use bb_core::message::Stamped;
-use bb_core::payload::{GnssFix, GnssStatus, Imu, Pose};
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Imu, Pose};
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 /// A sample of an IMU in the axes of the body.
@@ -16,6 +17,41 @@ pub(in crate::navigation) fn sample(imu: &Stamped<Imu>, body_from_imu: &UnitQuat
         angular_velocity: body_from_imu * imu.angular_velocity,
         specific_force: body_from_imu * imu.linear_acceleration,
     }
+}
+
+/// Pose of the sensor of an input in a body with the axes of the link and its origin at the IMU. `None` for an input that the robot does
+/// not declare.
+pub(in crate::navigation) fn in_body(
+    context: &Context,
+    link_from_imu: &Isometry3<f64>,
+    input: &str,
+) -> Option<Isometry3<f64>> {
+    let mut pose = context.frame_from_input(input).ok()?;
+    pose.translation.vector -= link_from_imu.translation.vector;
+    Some(pose)
+}
+
+/// A place on the Earth as a payload.
+pub(in crate::navigation) fn place_of(place: &Geodetic) -> GeodeticPosition {
+    let Geodetic { latitude, longitude, height } = *place;
+    GeodeticPosition { latitude_rad: latitude, longitude_rad: longitude, altitude: Some(height) }
+}
+
+/// Covariance of a fix that reports none: of its vertical deviation, twice the horizontal one, m.
+pub(in crate::navigation) fn of_fix(deviation: f64) -> Matrix3<f64> {
+    let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
+    Matrix3::from_diagonal(&deviations.component_mul(&deviations))
+}
+
+/// The square root of a variance, if it is given.
+pub(in crate::navigation) fn deviation(variance: Option<f64>, otherwise: f64) -> f64 {
+    variance.filter(|variance| *variance > 0.0).map_or(otherwise, f64::sqrt)
+}
+
+/// The heading of the x axis, rad.
+pub(in crate::navigation) fn heading(world_from_body: &UnitQuaternion<f64>) -> f64 {
+    let ahead = world_from_body * Vector3::x();
+    ahead.y.atan2(ahead.x)
 }
 
 /// A covariance, if it carries information: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
@@ -41,9 +77,7 @@ impl GnssPosition {
     /// horizontal, m, applies to a fix that reports none. Vertically, twice that is used.
     pub fn of_fix(fix: &GnssFix, frame: &LocalFrame, lever_arm: Vector3<f64>, deviation: f64) -> Option<Self> {
         let geodetic = Geodetic::of_fix(fix, frame.origin().height)?;
-        let deviations = Vector3::new(1.0, 1.0, 2.0) * deviation;
-        let unknown = || Matrix3::from_diagonal(&deviations.component_mul(&deviations));
-        let mut covariance = told(fix.position_covariance).unwrap_or_else(unknown);
+        let mut covariance = told(fix.position_covariance).unwrap_or_else(|| of_fix(deviation));
         if fix.position.is_some_and(|position| position.altitude.is_none()) {
             covariance[(2, 2)] = UNKNOWN_HEIGHT * UNKNOWN_HEIGHT;
         }

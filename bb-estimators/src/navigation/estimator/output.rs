@@ -1,8 +1,9 @@
 //! Outputs of the declared filter.
 
-use super::input::Mounting;
+use super::input::Setup;
+use super::life::Runs;
 use super::report::NavigationStatus;
-use super::running::Core;
+use super::starting::Starting;
 use bb_core::Outputs;
 use bb_core::payload::Odometry;
 
@@ -16,7 +17,7 @@ use bb_core::payload::Odometry;
 pub trait NavigationOutput: Outputs + Sized {
     /// The value to emit.
     #[doc(hidden)]
-    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self>;
+    fn of(running: &dyn Runs<Starting>, setup: &Setup) -> Option<Self>;
 }
 
 /// The outputs of `Eskf<NavigationOutputs>`: `output odometry;`, `output status;`.
@@ -30,14 +31,14 @@ pub struct NavigationOutputs {
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for Odometry {
-    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self> {
-        core.odometry(mounting)
+    fn of(running: &dyn Runs<Starting>, setup: &Setup) -> Option<Self> {
+        running.odometry(setup)
     }
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl NavigationOutput for NavigationOutputs {
-    fn of(core: &dyn Core, mounting: &Mounting) -> Option<Self> {
-        Some(Self { odometry: Some(core.odometry(mounting)?), status: Some(core.status()?) })
+    fn of(running: &dyn Runs<Starting>, setup: &Setup) -> Option<Self> {
+        Some(Self { odometry: Some(running.odometry(setup)?), status: Some(running.status()?) })
     }
 }

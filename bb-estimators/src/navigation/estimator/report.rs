@@ -1,14 +1,11 @@
 //! Outputs and status of the filter.
 
-use super::filter::Filter;
-use super::input::Mounting;
-use super::world::World;
-use crate::navigation::geodesy::Geodetic;
-use crate::navigation::math::skew;
+use super::life::{Sensed, Verdicts, World};
+use crate::navigation::eskf::EskfFilter;
+use crate::navigation::math::{skew, sqrt};
 use crate::navigation::state::{
     Estimate, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
-use crate::navigation::stream::Counts;
 use bb_core::Payload;
 use bb_core::payload::{GeodeticPosition, Odometry, Pose, Twist};
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
@@ -70,47 +67,8 @@ pub struct NavigationStatus {
     pub resets: u32,
 }
 
-/// A sensor's measurements since the start, by result.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
-pub struct Verdicts {
-    /// Number of measurements that corrected the estimate.
-    pub fused: u64,
-    /// Number of measurements that the gate refused: too far from the prediction.
-    pub refused: u64,
-    /// Number of measurements that were not finite, too late or in the future.
-    pub invalid: u64,
-}
-
-impl From<&Counts> for Verdicts {
-    fn from(counts: &Counts) -> Self {
-        Self {
-            fused: counts.fused + counts.weighed_down,
-            refused: counts.gate,
-            invalid: counts.invalid + counts.late + counts.future,
-        }
-    }
-}
-
-/// A place on the Earth as a payload.
-pub(in crate::navigation) fn place_of(place: &Geodetic) -> GeodeticPosition {
-    let Geodetic { latitude, longitude, height } = *place;
-    GeodeticPosition { latitude_rad: latitude, longitude_rad: longitude, altitude: Some(height) }
-}
-
-/// Pose and motion of the link.
-pub(super) fn odometry_of<S: States, const N: usize>(
-    filter: &Filter<S, N>,
-    world: &World,
-    mounting: &Mounting,
-) -> Option<Odometry> {
-    let Estimate { position, velocity, world_from_body, angular_velocity, .. } = *filter.estimate()?;
-    let covariance = filter.eskf().covariance().fixed_view::<NAVIGATION, NAVIGATION>(0, 0).into_owned();
-    let motion = Motion { position, velocity, world_from_body, angular_velocity, covariance };
-    Some(motion.of_link(&mounting.link(), world.first_from_frame()))
-}
-
 /// A filter's estimate of the body's motion, whatever else it estimates.
-struct Motion {
+pub(super) struct Motion {
     position: Vector3<f64>,
     velocity: Vector3<f64>,
     world_from_body: UnitQuaternion<f64>,
@@ -120,9 +78,15 @@ struct Motion {
 }
 
 impl Motion {
+    pub(super) fn of<S: States, const N: usize>(filter: &EskfFilter<S, N>) -> Option<Self> {
+        let Estimate { position, velocity, world_from_body, angular_velocity, .. } = *filter.estimate()?;
+        let covariance = filter.covariance().fixed_view::<NAVIGATION, NAVIGATION>(0, 0).into_owned();
+        Some(Self { position, velocity, world_from_body, angular_velocity, covariance })
+    }
+
     /// Pose and motion of a link whose origin is at `link` in the body, in another world.
     #[inline(never)]
-    fn of_link(&self, link: &Vector3<f64>, first_from_frame: &Isometry3<f64>) -> Odometry {
+    pub(super) fn of_link(&self, link: &Vector3<f64>, first_from_frame: &Isometry3<f64>) -> Odometry {
         let block = |row: usize, column: usize| self.covariance.fixed_view::<3, 3>(row, column).into_owned();
         let rotation = self.world_from_body.to_rotation_matrix().into_inner();
         let arm = rotation * link;
@@ -169,22 +133,23 @@ impl Motion {
 }
 
 /// The remaining status of the filter.
-pub(super) fn status_of<S: States, const N: usize>(
-    filter: &Filter<S, N>,
+pub(super) fn status_of<S: States + Send, const N: usize>(
+    sensed: &Sensed<EskfFilter<S, N>>,
     world: &World,
 ) -> Option<NavigationStatus> {
+    let filter = sensed.best();
     let estimate = filter.estimate()?;
     let mounting =
         |i: usize| offset::<S>(Optional::WheelMounting).map_or(0.0, |first| estimate.optional[first + i]);
-    let [gnss, odometry, pose, relative, magnetic_field, pressure, gnss_velocity, gnss_heading] =
-        filter.counts().map(Verdicts::from);
+    let deviation = |i: usize| sqrt(filter.covariance()[(i, i)]);
+    let [gnss, odometry, pose, relative, magnetic_field, pressure, gnss_velocity, gnss_heading] = sensed.verdicts();
     Some(NavigationStatus {
         accelerometer_bias: estimate.accelerometer_bias,
         gyroscope_bias: estimate.gyroscope_bias,
-        dead_reckoning_s: filter.eskf().dead_reckoning_s(),
-        horizontal_deviation: filter.horizontal_deviation(),
-        heading_deviation: filter.copies().heading_deviation(),
-        imu_noise: filter.copies().noise(),
+        dead_reckoning_s: filter.dead_reckoning_s(),
+        horizontal_deviation: sensed.deviation(),
+        heading_deviation: sensed.copies.heading_deviation(),
+        imu_noise: sensed.copies.noise(),
         gnss,
         gnss_velocity,
         gnss_heading,
@@ -199,13 +164,13 @@ pub(super) fn status_of<S: States, const N: usize>(
         relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
         gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
         gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
-        gnss_delay_deviation: filter.deviation(Optional::GnssDelay),
+        gnss_delay_deviation: offset::<S>(Optional::GnssDelay).map_or(0.0, deviation),
         hard_iron: estimate.vector::<S>(Optional::HardIron),
         barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
-        world_origin: world.first().map(|frame| place_of(frame.origin())),
-        gaps: filter.eskf().gaps(),
+        world_origin: world.origin(),
+        gaps: filter.gaps(),
         // The start counts as the first.
-        resets: filter.eskf().resets().saturating_sub(1),
+        resets: filter.resets().saturating_sub(1),
     })
 }
 

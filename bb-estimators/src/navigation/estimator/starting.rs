@@ -1,9 +1,9 @@
 //! Before the filter starts.
 
 use super::course::Course;
-use super::input::{Mounting, NavigationInputs};
-use super::options::NavigationOptions;
-use super::world::World;
+use super::input::{NavigationInputs, Setup};
+use super::life::{Starts, World, new_of};
+use super::report::NavigationStatus;
 use crate::navigation::alignment::{Alignment, AlignmentParams};
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::geodesy::LocalFrame;
@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Gathers the data that a start needs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Starting {
+pub(in crate::navigation) struct Starting {
     alignment: Alignment,
     course: Course,
     /// The given state, moved on with each sample.
@@ -33,10 +33,14 @@ pub(super) struct Starting {
     last_ns: i64,
 }
 
-impl Starting {
-    /// `frame` is that of the world, if it already has one.
-    pub(super) fn new(options: &NavigationOptions, frame: Option<LocalFrame>) -> Self {
-        let params = AlignmentParams { gravity: options.gravity, ..AlignmentParams::default() };
+impl Starts for Starting {
+    type Setup = Setup;
+    type Inputs<'a> = NavigationInputs<'a>;
+    type Start = Start;
+    type Status = NavigationStatus;
+
+    fn new(setup: &Setup, frame: Option<LocalFrame>) -> Self {
+        let params = AlignmentParams { gravity: setup.options.gravity, ..AlignmentParams::default() };
         Self {
             alignment: Alignment::new(params),
             course: Course::within(frame),
@@ -48,23 +52,12 @@ impl Starting {
         }
     }
 
-    /// Returns whether the start has lasted long enough to be reported.
-    pub(super) fn takes_too_long(&self) -> bool {
-        self.has_waited(self.first_ns, LONGEST_START_NS)
-    }
-
-    fn has_waited(&self, since_ns: Option<i64>, longest_ns: i64) -> bool {
-        since_ns.is_some_and(|since_ns| self.last_ns.saturating_sub(since_ns) > longest_ns)
-    }
-
-    /// Adds the new inputs. Returns the start of the filter once it is known.
-    pub(super) fn take(
+    fn take(
         &mut self,
         sample: &ImuMean,
         inputs: &NavigationInputs<'_>,
-        options: &NavigationOptions,
-        mounting: &Mounting,
-    ) -> Option<(Start, World)> {
+        setup: &Setup,
+    ) -> Option<(Start, Option<LocalFrame>)> {
         if let Err(refusal) = self.alignment.add(sample) {
             tracing::debug!(%refusal, "sample refused");
             return None;
@@ -74,52 +67,61 @@ impl Starting {
             move_on(given, sample);
         }
         if let Some(start) = inputs.start.filter(|start| start.is_new()) {
-            self.given = given(start.message(), sample, options, mounting);
+            self.given = given(start.message(), sample, setup);
         }
         self.last_ns = sample.time_ns;
         self.course.turn(sample);
-        self.course.see(inputs.gnss, options.gnss_deviation);
-        let world = World::new(self.course.frame());
-        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
-            let measured = world.pose(&pose.payload, options, mounting);
-            self.pose = Some((pose.monotonic_time.as_nanos(), measured));
+        self.course.see(inputs.gnss, setup.options.gnss_deviation);
+        let frame = self.course.frame();
+        if let Some((time_ns, pose)) = new_of(inputs.pose) {
+            self.pose = Some((time_ns, setup.absolute_pose(pose, &World::new(frame))));
         }
-        let start = self.start(options, mounting).ok()?;
-        Some((start, world))
+        let start = self.start(setup).ok()?;
+        Some((start, frame))
     }
 
-    fn start(&mut self, options: &NavigationOptions, mounting: &Mounting) -> Result<Start, Refusal> {
+    fn hindrance(&self) -> Option<&'static str> {
+        self.takes_too_long().then_some("it has neither lain still nor seen a course, and cannot start")
+    }
+}
+
+impl Starting {
+    /// Returns whether the start has lasted long enough to be reported.
+    fn takes_too_long(&self) -> bool {
+        self.has_waited(self.first_ns, LONGEST_START_NS)
+    }
+
+    fn has_waited(&self, since_ns: Option<i64>, longest_ns: i64) -> bool {
+        since_ns.is_some_and(|since_ns| self.last_ns.saturating_sub(since_ns) > longest_ns)
+    }
+
+    fn start(&mut self, setup: &Setup) -> Result<Start, Refusal> {
         let given = self.given.filter(|given| given.time_ns == self.last_ns);
-        if mounting.has_gnss() {
-            return self.at_fix(given, options, mounting);
+        if setup.has_gnss() {
+            return self.at_fix(given, setup);
         }
         if let Some(given) = given {
             return Ok(given);
         }
-        if mounting.pose.is_some() && !self.takes_too_long() {
+        if setup.pose.is_some() && !self.takes_too_long() {
             return self.at_pose();
         }
-        let is_measured = mounting.pose.is_some() || mounting.magnetic_field.is_some();
-        let deviation = options.heading_deviation;
+        let is_measured = setup.pose.is_some() || setup.magnetic_field.is_some();
+        let deviation = setup.options.heading_deviation;
         let deviation = if is_measured || deviation <= UNKNOWN_HEADING { deviation } else { HEADING_BY_DEFINITION };
-        self.alignment.at_rest((-mounting.link(), ORIGIN_DEVIATION), (options.heading, deviation))
+        self.alignment.at_rest((-setup.link(), ORIGIN_DEVIATION), (setup.options.heading, deviation))
     }
 
     /// Returns a start at the last fix, with the velocity of the last ones.
-    fn at_fix(
-        &mut self,
-        given: Option<Start>,
-        options: &NavigationOptions,
-        mounting: &Mounting,
-    ) -> Result<Start, Refusal> {
+    fn at_fix(&mut self, given: Option<Start>, setup: &Setup) -> Result<Start, Refusal> {
         let fix = *self.course.newest(self.last_ns).ok_or(Refusal::NotObservable)?;
         self.placed_ns = self.placed_ns.or(Some(self.last_ns));
         let start = match given {
             Some(given) => given,
-            None => self.found(&fix, (options.heading, options.heading_deviation))?,
+            None => self.found(&fix, (setup.options.heading, setup.options.heading_deviation))?,
         };
         // The fix is the position of the antenna, and some time old.
-        let antenna = start.world_from_body * mounting.antenna();
+        let antenna = start.world_from_body * setup.antenna();
         let age_s = start.time_ns.saturating_sub(fix.time_ns) as f64 * 1e-9;
         let position = fix.position + start.velocity * age_s - antenna;
         // A single fix shows nothing of its noise.
@@ -170,20 +172,15 @@ impl Starting {
 }
 
 /// The start from the state of the link in a message, at the time of a sample; `None` if it holds no pose.
-fn given(
-    state: &Stamped<Odometry>,
-    sample: &ImuMean,
-    options: &NavigationOptions,
-    mounting: &Mounting,
-) -> Option<Start> {
-    let (position, world_from_body, velocity) = mounting.state(state);
+fn given(state: &Stamped<Odometry>, sample: &ImuMean, setup: &Setup) -> Option<Start> {
+    let (position, world_from_body, velocity) = setup.state(state);
     let is_state = position.iter().chain(world_from_body.coords.iter()).chain(&velocity).all(|x| x.is_finite());
     let is_rotation = (0.99..1.01).contains(&world_from_body.norm());
-    let (deviation, turned) = (options.pose_deviation, TURNED_PER_METRE * options.pose_deviation);
+    let (deviation, turned) = (setup.options.pose_deviation, TURNED_PER_METRE * setup.options.pose_deviation);
     let start = Start::at(
         state.monotonic_time.as_nanos(),
         (position, deviation),
-        (velocity, options.odometry_deviation),
+        (velocity, setup.options.odometry_deviation),
         (UnitQuaternion::new_normalize(world_from_body.into_inner()), turned),
     );
     let known = |covariance: Option<nalgebra::Matrix6<f64>>, first: usize| -> Option<Matrix3<f64>> {

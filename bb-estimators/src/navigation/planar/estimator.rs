@@ -4,17 +4,18 @@ mod filter;
 mod input;
 mod options;
 mod output;
-mod running;
+mod report;
 mod starting;
 
 pub use input::PlanarInputs;
 pub use options::PlanarOptions;
-pub use output::{PlanarOutput, PlanarOutputs, PlanarStatus};
+pub use output::{PlanarOutput, PlanarOutputs};
+pub use report::PlanarStatus;
 
-use self::input::Mounting;
-use self::running::Running;
+use self::filter::started;
+use self::input::Setup;
 use self::starting::Starting;
-use crate::navigation::estimator::fusing::{Taken, doubted};
+use crate::navigation::estimator::life::Life;
 use crate::navigation::estimator::measured::sample;
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
@@ -61,16 +62,8 @@ use std::marker::PhantomData;
 /// that of [`EskfEstimator`](crate::navigation::EskfEstimator).
 #[derive(Debug)]
 pub struct PlanarEstimator<O = Odometry> {
-    options: PlanarOptions,
-    mounting: Mounting,
-    phase: Phase,
+    life: Life<Starting>,
     output: PhantomData<fn() -> O>,
-}
-
-#[derive(Debug)]
-enum Phase {
-    Starting(Box<Starting>),
-    Running(Box<Running>),
 }
 
 impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
@@ -80,31 +73,11 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
 
     fn init(options: PlanarOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;
-        let mounting = Mounting::of(context)?;
-        Ok(Self { options, mounting, phase: Phase::Starting(Box::new(Starting::new(None))), output: PhantomData })
+        Ok(Self { life: Life::new(Setup::new(options, context)?), output: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: PlanarInputs<'_>) -> Result<Reply<O>, Fault> {
-        let sample = sample(inputs.imu.message(), &self.mounting.body_from_imu);
-        let Self { options, mounting, phase, .. } = self;
-        match phase {
-            Phase::Starting(starting) => {
-                if let Some((start, frame)) = starting.take(&sample, &inputs, options, mounting) {
-                    *phase = Phase::Running(Running::new(options, mounting, &start, frame)?);
-                    return Ok(Reply::none());
-                }
-                let reason = starting.takes_too_long().then_some("it cannot start without fixes");
-                Ok(doubted(Reply::none(), reason))
-            }
-            Phase::Running(running) => {
-                let taken = running.take(&sample, &inputs, options, mounting);
-                let taken = running.fusing.judge(taken)?;
-                let reply = taken.reply(|| O::of(running.fusing.now(), mounting, running.frame.as_ref()));
-                if let Taken::Lost = taken {
-                    *phase = Phase::Starting(Box::new(Starting::new(running.frame)));
-                }
-                Ok(reply)
-            }
-        }
+        let sample = sample(inputs.imu.message(), &self.life.setup.body_from_imu);
+        self.life.take(&sample, &inputs, started, O::of)
     }
 }

@@ -15,6 +15,7 @@ use super::matrix::{
     Root, Square, add_gram, axpy, dot, lower_root, mirror, times, transpose_times, transposed, zeros,
 };
 use crate::navigation::factor::{MOST_ROWS, Rows};
+use crate::navigation::fused::Judged;
 use crate::navigation::math::ln;
 
 /// Transformation of a keyframe's ties to later poses by its elimination.
@@ -259,17 +260,6 @@ impl<const N: usize> Known<'_, N> {
             }
         }
     }
-}
-
-/// The gating quantities of a measurement, before it is fused.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Judged {
-    /// Normalised innovation squared.
-    pub(super) nis: f64,
-    /// `-½ ln det S`.
-    pub(super) log_density: f64,
-    /// The first component of the whitened innovation.
-    pub(super) whitened: f64,
 }
 
 /// Compares a factor at one keyframe with its estimate.

@@ -1,15 +1,15 @@
 //! Gates and adds measurements at any keyframe of the window.
 
-use super::elimination::{Judged, Known, judge, judge_pair, judge_with};
+use super::elimination::{Known, judge, judge_pair, judge_with};
 use super::filter::FixedLagSmoother;
 use super::kernel::Kernel;
 use super::keyframe::{Held, Prior};
 use crate::navigation::factor::Factor;
 use crate::navigation::factor::Rows;
-use crate::navigation::fused::Fused;
+use crate::navigation::fused::{Fused, Judged};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::States;
-use crate::navigation::stream::{Gate, Stream, Verdict};
+use crate::navigation::stream::{Gate, Stream};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Adds a measurement at a keyframe of the window. Measurements may arrive in any order.
@@ -68,32 +68,30 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
         keyframe.rows::<S>(&factor, before.map(|before| &**before), &mut rows)?;
         rows.weigh(trust);
-        let (judged, dimension) = (self.judged(index, &rows, factor.previous().is_some()), rows.count);
-        let judged = judged.ok_or(Refusal::NonFinite)?;
-        let Verdict { weight, limit, log_likelihood } =
-            stream.weigh(judged.nis, dimension, judged.log_density, Gate::Closed)?;
-        let is_robust = kernel != Kernel::Squares;
         let ties = factor.previous().is_some();
-        let held = Held { factor, kernel, trust: trust * weight, weight: 1.0 };
+        let judged = self.judged(index, &rows, ties).ok_or(Refusal::NonFinite)?;
+        let fused = stream.weigh(&judged, rows.count, Gate::Closed)?;
+        let is_robust = kernel != Kernel::Squares;
+        let held = Held { factor, kernel, trust: trust * fused.weight, weight: 1.0 };
         if let Some(keyframe) = self.window.get_mut(index) {
             keyframe.factors.push(held);
             keyframe.is_robust |= is_robust;
             if is_robust {
                 self.linearise(index);
             } else {
-                rows.weigh(weight);
+                rows.weigh(fused.weight);
                 if ties {
                     keyframe.link.add(&rows);
                     if let Some(landmarks) = &mut self.landmarks {
                         landmarks.coupling.relink(index);
                     }
                 } else {
-                    keyframe.own.add_rows(&rows.at[..dimension], &rows.residual[..dimension]);
+                    keyframe.own.add_rows(&rows.at[..fused.dimension], &rows.residual[..fused.dimension]);
                 }
             }
         }
         self.dirty = self.dirty.min(index);
-        Ok(Fused { nis: judged.nis, dimension, weight, limit, log_likelihood, whitened: judged.whitened })
+        Ok(fused)
     }
 
     /// Compares a factor with the current estimate. Only the correction of the newest keyframe is recomputed; the

@@ -14,15 +14,8 @@ use super::coupling::{POSE, place};
 use super::keyframe::Window;
 use super::landmark::{Landmark, Sight};
 use super::matrix::Square;
+use crate::navigation::fused::Judged;
 use crate::navigation::math::ln;
-
-/// The gating quantities of an observation, before it is used.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Judged {
-    pub(super) nis: f64,
-    pub(super) log_density: f64,
-    pub(super) whitened: f64,
-}
 
 /// The covariances for gating the observations at one keyframe, as they were before the first.
 #[derive(Clone, Debug)]

@@ -3,17 +3,17 @@
 //! The chain has no place for them. They couple the poses of their keyframes as a landmark does that both have seen, and are carried
 //! along its elimination in the same way; see `coupling.rs`. When the earlier keyframe leaves, what they say stays in the prior.
 
-use super::elimination::{Judged, judge_with};
+use super::elimination::judge_with;
 use super::filter::FixedLagSmoother;
 use super::kernel::Kernel;
 use super::keyframe::Held;
 use super::landmarks::Landmarks;
 use super::pair::{Pair, linearised};
 use crate::navigation::factor::{Factor, Rows};
-use crate::navigation::fused::Fused;
+use crate::navigation::fused::{Fused, Judged};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::States;
-use crate::navigation::stream::{Gate, Stream, Verdict};
+use crate::navigation::stream::{Gate, Stream};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Gates and adds a factor on a keyframe and an earlier one that is not the one directly before.
@@ -32,11 +32,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         linearised::<F, S, N>(&factor, earlier, later, &mut rows)?;
         let trust = 1.0 / stream.params().variance_factor;
         rows.weigh(trust);
-        let dimension = rows.count;
         let judged = self.judged_pair((from, to), &rows).ok_or(Refusal::NonFinite)?;
-        let Verdict { weight, limit, log_likelihood } =
-            stream.weigh(judged.nis, dimension, judged.log_density, Gate::Closed)?;
-        let held = Held { factor, kernel, trust: trust * weight, weight: 1.0 };
+        let fused = stream.weigh(&judged, rows.count, Gate::Closed)?;
+        let held = Held { factor, kernel, trust: trust * fused.weight, weight: 1.0 };
         let window = self.params.window;
         let coupling = &mut self.landmarks.get_or_insert_with(|| Landmarks::none(window)).coupling;
         let serials = (coupling.first + from as u64, coupling.first + to as u64);
@@ -49,7 +47,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         coupling.add_pair((from, to), pair.rows(), 1.0);
         self.pairs.push(pair);
         self.dirty = self.dirty.min(from);
-        Ok(Fused { nis: judged.nis, dimension, weight, limit, log_likelihood, whitened: judged.whitened })
+        Ok(fused)
     }
 
     /// Compares such a factor with the estimates of its keyframes.

@@ -144,29 +144,17 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let since = since.or_else(|| landmark.slot.filter(|_| at > 0).map(|_| 0));
         let judged = landmarks.judging.judge(landmark, &sight, &innovation, &self.window, since);
         let judged = judged.ok_or(Refusal::NonFinite);
-        let log_density = judged.map_or(0.0, |judged| judged.log_density);
-        let verdict = judged.and_then(|judged| {
-            let verdict = stream.weigh(judged.nis, 2, log_density, Gate::Closed)?;
-            Ok((judged, verdict))
-        });
-        let (judged, verdict) = match verdict {
-            Ok(verdict) => verdict,
+        let fused = match judged.and_then(|judged| stream.weigh(&judged, 2, Gate::Closed)) {
+            Ok(fused) => fused,
             Err(refusal) => return self.refuse(index, is_new, sight, refusal),
         };
-        sight.precision *= sqrt(verdict.weight);
-        sight.jacobian *= sqrt(verdict.weight);
-        sight.residual *= sqrt(verdict.weight);
-        sight.weight = landmarks.params.kernel.weight(judged.nis);
+        sight.precision *= sqrt(fused.weight);
+        sight.jacobian *= sqrt(fused.weight);
+        sight.residual *= sqrt(fused.weight);
+        sight.weight = landmarks.params.kernel.weight(fused.nis);
         landmarks.add::<F, S>(index, sight, &self.window);
         self.dirty = self.dirty.min(landmarks.coupling.changed());
-        Ok(Sighted::Used(Fused {
-            nis: judged.nis,
-            dimension: 2,
-            weight: verdict.weight,
-            limit: verdict.limit,
-            log_likelihood: verdict.log_likelihood,
-            whitened: judged.whitened,
-        }))
+        Ok(Sighted::Used(fused))
     }
 
     /// Refuses an observation that does not fit its landmark. After too many refusals in a row, restarts the landmark

@@ -49,8 +49,7 @@ impl InputKind {
 named! {
     /// Severity of an event.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-    #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
-    pub enum Level {
+    pub enum Level: Payload {
         /// There is no estimate, or soon will be none.
         Error = "error",
         /// The estimate is impaired.

@@ -14,8 +14,7 @@ use super::params::{StateEstimatorParams, ns};
 named! {
     /// Source of the estimate.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-    #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
-    pub enum SourceLabel {
+    pub enum SourceLabel: Payload {
         /// The IMU alone, or a camera that has had no position since it was last lost. The covariance grows.
         #[default]
         DeadReckoned = "dead_reckoned",

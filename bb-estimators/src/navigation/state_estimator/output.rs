@@ -75,8 +75,7 @@ pub struct EstimatorHealth {
 named! {
     /// State of the estimator.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-    #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
-    pub enum HealthState {
+    pub enum HealthState: Payload {
         /// Estimator that has not started.
         #[default]
         Init = "init",

@@ -1,138 +1,129 @@
-//! The filter, with a stream for each sensor.
+//! The filter, with its sensors and outputs.
 
-use super::options::PlanarOptions;
-use crate::navigation::copies::{Copies, Ways};
-use crate::navigation::estimator::correlation::Correlation;
-use crate::navigation::estimator::fusing::Sensing;
-use crate::navigation::estimator::health::{Sight, Watch, largest_deviation};
+use super::input::{PlanarInputs, Setup};
+use super::report::{PlanarStatus, odometry_of, status_of};
+use super::starting::Starting;
+use crate::navigation::estimator::life::{Limits, Running, Runs, Sensed, Sensing, World, new_of};
 use crate::navigation::fused::Fused;
-use crate::navigation::history::Replayed;
+use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::planar::estimate::{POSITION, PlanarEstimate};
 use crate::navigation::planar::filter::{PlanarFilter, PlanarStart};
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use crate::navigation::refusal::Refusal;
-use crate::navigation::stream::{Counts, Stream};
 use bb_core::Fault;
+use bb_core::payload::Odometry;
 
-/// Copies of the filter, and a stream for each sensor.
-#[derive(Clone, Debug)]
-pub(super) struct Filter {
-    copies: Copies<PlanarFilter>,
-    correlation: Correlation,
-    gnss: Stream,
-    odometry: Stream,
-    yaw_rate: Stream,
-    pose: Stream,
-    orientation: Stream,
+/// Number of states in the history.
+const STATES: usize = 16;
+
+/// A filter that has started.
+pub(super) fn started(
+    setup: &Setup,
+    start: &PlanarStart,
+    frame: Option<LocalFrame>,
+) -> Result<Box<dyn Runs<Starting>>, Fault> {
+    let options = &setup.options;
+    let sensed = Sensed::<PlanarFilter>::new(options.params(), start, options.odometry_correlation)?;
+    let dead_reckoning_s = setup.has_positions().then_some(options.longest_dead_reckoning);
+    let limits = Limits { dead_reckoning_s, deviation: options.largest_deviation };
+    Ok(Box::new(Running::<_, STATES>::new(sensed, limits, frame)?))
 }
 
 /// A measurement from one of the sensors.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Measured {
+pub(in crate::navigation) enum Measured {
     Gnss(PlanarPosition),
     Odometry(WheelVelocity, YawRate),
     Pose(PlanarPose),
     Orientation(PlanarHeading),
 }
 
-impl Filter {
-    pub(super) fn new(options: &PlanarOptions, start: &PlanarStart) -> Result<Self, Fault> {
-        let mut copies = Copies::new(options.params(), Ways { noise: true, scale: false })?;
-        copies.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
-        let correlation = Correlation::new(options.odometry_correlation);
-        let stream = Stream::default();
-        let (gnss, odometry, yaw_rate, pose, orientation) = (stream, stream, stream, stream, stream);
-        Ok(Self { copies, correlation, gnss, odometry, yaw_rate, pose, orientation })
-    }
+impl Sensing for PlanarFilter {
+    type Starting = Starting;
+    type Measured = Measured;
 
-    pub(super) fn copies(&self) -> &Copies<PlanarFilter> {
-        &self.copies
-    }
+    const NAMES: &'static [&'static str] = &["gnss", "odometry", "yaw_rate", "pose", "orientation"];
 
-    pub(super) fn ekf(&self) -> &PlanarFilter {
-        self.copies.best()
-    }
-
-    /// Standard deviation of the position in its least certain direction, m.
-    pub(super) fn deviation(&self) -> f64 {
-        let covariance = self.ekf().covariance();
-        let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
-        largest_deviation(of(0, 0), of(0, 1), of(1, 1))
-    }
-
-    /// Counts of the measurements: satellite fixes, odometry velocities and yaw rates, poses, orientations.
-    pub(super) fn counts(&self) -> [&Counts; 5] {
-        [&self.gnss, &self.odometry, &self.yaw_rate, &self.pose, &self.orientation].map(Stream::counts)
-    }
-}
-
-impl Replayed for Filter {
-    type Filter = Copies<PlanarFilter>;
-    type Measurement = Measured;
-
-    fn filter(&self) -> &Copies<PlanarFilter> {
-        &self.copies
-    }
-
-    fn filter_mut(&mut self) -> &mut Copies<PlanarFilter> {
-        &mut self.copies
-    }
-
-    fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
-        let copies = &mut self.copies;
+    fn sensor(measured: &Measured) -> usize {
         match measured {
-            Measured::Gnss(fix) => copies.update_fix(&mut self.gnss, fix),
+            Measured::Gnss(_) => 0,
+            // The velocity; its yaw rate is next.
+            Measured::Odometry(..) => 1,
+            Measured::Pose(_) => 3,
+            Measured::Orientation(_) => 4,
+        }
+    }
+
+    fn correct(sensed: &mut Sensed<Self>, measured: &Measured) -> Result<Fused, Refusal> {
+        let Sensed { copies, streams: [gnss, odometry, yaw_rate, pose_stream, orientation, ..], correlation } =
+            sensed;
+        match measured {
+            Measured::Gnss(fix) => copies.update_fix(gnss, fix),
             Measured::Odometry(velocity, rate) => {
                 let now_ns = copies.estimate().ok_or(Refusal::NotStarted)?.time_ns;
-                let factor = self.correlation.factor(now_ns);
+                let factor = correlation.factor(now_ns);
                 let correlated = WheelVelocity { covariance: velocity.covariance * (factor * factor), ..*velocity };
-                let result = copies.update_correlated(&mut self.odometry, velocity, &correlated);
+                let result = copies.update_correlated(odometry, velocity, &correlated);
                 let correlated = YawRate { deviation: rate.deviation * factor, ..*rate };
-                result.and(copies.update_correlated(&mut self.yaw_rate, rate, &correlated))
+                result.and(copies.update_correlated(yaw_rate, rate, &correlated))
             }
-            Measured::Pose(pose) => copies.update_position(&mut self.pose, pose),
-            Measured::Orientation(heading) => copies.update(&mut self.orientation, heading),
+            Measured::Pose(pose) => copies.update_position(pose_stream, pose),
+            Measured::Orientation(heading) => copies.update(orientation, heading),
         }
     }
-}
 
-impl Sensing for Filter {
-    fn sensor(measured: &Measured) -> &'static str {
-        match measured {
-            Measured::Gnss(_) => "gnss",
-            Measured::Odometry(..) => "odometry",
-            Measured::Pose(_) => "pose",
-            Measured::Orientation(_) => "orientation",
+    fn fuse<const STATES: usize>(
+        running: &mut Running<Self, STATES>,
+        inputs: &PlanarInputs<'_>,
+        setup: &Setup,
+    ) -> Result<(), Refusal> {
+        if let Some((time_ns, fix)) = new_of(inputs.gnss)
+            && let Some(frame) = &running.world.frame
+            && let Some(measured) = setup.fix(fix, frame)
+        {
+            running.fuse(time_ns, Measured::Gnss(measured));
         }
+        if let Some((time_ns, odometry)) = new_of(inputs.odometry) {
+            let (velocity, rate) = setup.wheels(odometry);
+            running.fuse(time_ns, Measured::Odometry(velocity, rate));
+        }
+        if let Some((time_ns, pose)) = new_of(inputs.pose) {
+            running.fuse(time_ns, Measured::Pose(setup.pose(pose)));
+        }
+        if let Some((time_ns, orientation)) = new_of(inputs.orientation) {
+            running.fuse(time_ns, Measured::Orientation(setup.heading(orientation)));
+        }
+        running.has_moved();
+        Ok(())
+    }
+
+    fn odometry(&self, _: &World, setup: &Setup) -> Option<Odometry> {
+        odometry_of(self, setup)
+    }
+
+    fn status(sensed: &Sensed<Self>, world: &World) -> Option<PlanarStatus> {
+        status_of(sensed, world)
     }
 
     fn is_sound(&self) -> bool {
-        let variances = self.ekf().covariance().diagonal();
         let is_number = |estimate: &PlanarEstimate| {
             estimate.position.iter().chain(&estimate.velocity).all(|x| x.is_finite())
                 && estimate.heading.is_finite()
         };
-        variances.iter().all(|variance| variance.is_finite() && *variance >= 0.0)
-            && self.ekf().estimate().is_none_or(is_number)
+        self.covariance().diagonal().iter().all(|variance| variance.is_finite() && *variance >= 0.0)
+            && self.estimate().is_none_or(is_number)
     }
 
-    fn elsewhere(&self) -> Option<f64> {
-        self.copies.elsewhere()
+    fn horizontal(&self) -> [f64; 3] {
+        [(0, 0), (0, 1), (1, 1)].map(|(i, j)| self.covariance()[(POSITION + i, POSITION + j)])
     }
 
     fn resets(&self) -> u32 {
-        self.ekf().resets()
+        self.resets()
     }
 
-    fn watched(&self, watch: &mut Watch) -> Option<&'static str> {
-        watch.look(&Sight {
-            now_ns: self.ekf().estimate()?.time_ns,
-            counts: &self.counts(),
-            resets: self.resets(),
-            dead_reckoning_s: self.ekf().dead_reckoning_s(),
-            deviation: self.deviation(),
-            heading_deviation: self.copies.heading_deviation(),
-        })
+    fn dead_reckoning_s(&self) -> f64 {
+        self.dead_reckoning_s()
     }
 }
 
@@ -141,6 +132,7 @@ mod tests {
     use super::*;
     use crate::navigation::History;
     use crate::navigation::eskf::ImuMean;
+    use crate::navigation::planar::params::PlanarParams;
     use nalgebra::{Vector2, Vector3};
 
     /// The parts of a gap that a measurement divides are gaps.
@@ -148,11 +140,11 @@ mod tests {
     fn a_divided_gap_is_counted() {
         let rest = Vector2::zeros();
         let start = PlanarStart::at(0, (rest, 2.0), (0.3, 0.1), (rest, 0.5));
-        let filter = Filter::new(&PlanarOptions::default(), &start).unwrap();
-        let mut history = History::<_, 10, 10, 2>::new(filter, 90_000_000).unwrap();
+        let sensed = Sensed::<PlanarFilter>::new(PlanarParams::default(), &start, 1.0).unwrap();
+        let mut history = History::<_, 10, 10, 2>::new(sensed, 90_000_000).unwrap();
         history.update(90_000_000, &Measured::Gnss(PlanarPosition::new(rest, 1.0))).unwrap();
         let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::new(0.0, 0.0, 9.8));
         history.propagate(&ImuMean { time_ns: 180_000_000, angular_velocity, specific_force }).unwrap();
-        assert_eq!(history.now().ekf().gaps(), 2);
+        assert_eq!(history.now().best().gaps(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! Inputs of the declared filter, and the mounting of their sensors.
 
 use super::options::PlanarOptions;
-use crate::navigation::estimator::measured::told;
+use crate::navigation::estimator::measured::{deviation, heading, told};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::GnssPosition;
 use crate::navigation::numbers::UPRIGHT;
@@ -25,11 +25,12 @@ pub struct PlanarInputs<'a> {
     pub orientation: Option<Input<'a, Orientation>>,
 }
 
-/// The mounting of the sensors.
+/// Options, and the mounting of the sensors.
 ///
 /// The body of the filter is the frame of the odometry, where wheels do not move sideways; without one, the link.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Mounting {
+pub(in crate::navigation) struct Setup {
+    pub(super) options: PlanarOptions,
     pub(super) body_from_link: Isometry3<f64>,
     pub(super) body_from_imu: UnitQuaternion<f64>,
     antenna: Option<Vector2<f64>>,
@@ -38,9 +39,9 @@ pub(super) struct Mounting {
     pub(super) has_wheels: bool,
 }
 
-impl Mounting {
+impl Setup {
     /// The mounting that the robot declares.
-    pub(super) fn of(context: &Context) -> Result<Self, Fault> {
+    pub(super) fn new(options: PlanarOptions, context: &Context) -> Result<Self, Fault> {
         // Inputs that the robot does not declare have no mounting.
         let optional = |name: &str| context.frame_from_input(name).ok();
         let link_from_body = optional("odometry").unwrap_or_else(Isometry3::identity);
@@ -52,6 +53,7 @@ impl Mounting {
         }
         let body_from_link = link_from_body.inverse();
         Ok(Self {
+            options,
             body_from_link,
             body_from_imu: body_from_link.rotation * context.frame_from_driver()?.rotation,
             antenna: optional("gnss").map(|gnss| (body_from_link * gnss).translation.vector.xy()),
@@ -76,35 +78,35 @@ impl Mounting {
     }
 
     /// A fix in a frame; `None` if it has no position.
-    pub(super) fn fix(&self, fix: &GnssFix, frame: &LocalFrame, options: &PlanarOptions) -> Option<PlanarPosition> {
-        let fix = GnssPosition::of_fix(fix, frame, Vector3::zeros(), options.gnss_deviation)?;
+    pub(super) fn fix(&self, fix: &GnssFix, frame: &LocalFrame) -> Option<PlanarPosition> {
+        let fix = GnssPosition::of_fix(fix, frame, Vector3::zeros(), self.options.gnss_deviation)?;
         let covariance = fix.covariance.fixed_view::<2, 2>(0, 0).into_owned();
         Some(PlanarPosition { position: fix.position.xy(), covariance, lever_arm: self.antenna() })
     }
 
     /// The velocity and yaw rate from wheel odometry.
-    pub(super) fn wheels(&self, odometry: &Odometry, options: &PlanarOptions) -> (WheelVelocity, YawRate) {
+    pub(super) fn wheels(&self, odometry: &Odometry) -> (WheelVelocity, YawRate) {
         let square = |x: f64| x * x;
         let covariance = odometry.twist.covariance;
         let stated = |i: usize| covariance.map_or(0.0, |covariance| covariance[(i, i)]);
         let variance = |i: usize, least: f64| stated(i).max(square(least));
         let mut velocity = odometry.twist.linear.xy();
-        let mut noise = Matrix2::new(variance(0, options.odometry_deviation), 0.0, 0.0, 0.0);
-        if options.omnidirectional {
-            noise[(1, 1)] = variance(1, options.odometry_deviation);
+        let mut noise = Matrix2::new(variance(0, self.options.odometry_deviation), 0.0, 0.0, 0.0);
+        if self.options.omnidirectional {
+            noise[(1, 1)] = variance(1, self.options.odometry_deviation);
             let between = covariance.map_or(0.0, |covariance| 0.5 * (covariance[(0, 1)] + covariance[(1, 0)]));
             (noise[(0, 1)], noise[(1, 0)]) = (between, between);
         } else {
             velocity.y = 0.0;
-            noise[(1, 1)] = square(options.sideways_deviation);
+            noise[(1, 1)] = square(self.options.sideways_deviation);
         }
-        let deviation = variance(5, options.yaw_rate_deviation).sqrt();
+        let deviation = variance(5, self.options.yaw_rate_deviation).sqrt();
         let velocity = WheelVelocity { velocity, covariance: noise, lever_arm: Vector2::zeros() };
         (velocity, YawRate { rate: odometry.twist.angular.z, deviation })
     }
 
     /// Converts a pose of its sensor to a pose of the body.
-    pub(super) fn pose(&self, pose: &Pose, options: &PlanarOptions) -> PlanarPose {
+    pub(super) fn pose(&self, pose: &Pose) -> PlanarPose {
         let body_from_sensor = self.body_from_pose.unwrap_or_else(Isometry3::identity);
         let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
         let heading = heading(&world_from_body);
@@ -112,7 +114,10 @@ impl Mounting {
         let square = |x: f64| x * x;
         let (position, of_heading) = match told(pose.covariance) {
             Some(covariance) => (covariance.fixed_view::<2, 2>(0, 0).into_owned(), covariance[(5, 5)]),
-            None => (Matrix2::identity() * square(options.pose_deviation), square(0.1 * options.pose_deviation)),
+            None => (
+                Matrix2::identity() * square(self.options.pose_deviation),
+                square(0.1 * self.options.pose_deviation),
+            ),
         };
         // The heading determines the position of the body's origin, which therefore shares the heading's error.
         let by_heading = Vector2::new(arm.y, -arm.x);
@@ -126,20 +131,15 @@ impl Mounting {
     }
 
     /// The heading of the body, from an orientation of its sensor.
-    pub(super) fn heading(&self, orientation: &Orientation, options: &PlanarOptions) -> PlanarHeading {
+    pub(super) fn heading(&self, orientation: &Orientation) -> PlanarHeading {
         let body_from_sensor = self.body_from_orientation.unwrap_or_else(UnitQuaternion::identity);
         let world_from_body = orientation.world_from_body * body_from_sensor.inverse();
         let variance = orientation.covariance.map(|covariance| about_up(&orientation.world_from_body, &covariance));
-        let deviation =
-            variance.filter(|variance| *variance > 0.0).map_or(options.orientation_deviation, f64::sqrt);
-        PlanarHeading { heading: heading(&world_from_body), deviation }
+        PlanarHeading {
+            heading: heading(&world_from_body),
+            deviation: deviation(variance, self.options.orientation_deviation),
+        }
     }
-}
-
-/// The heading of the x axis, rad.
-pub(super) fn heading(world_from_body: &UnitQuaternion<f64>) -> f64 {
-    let ahead = world_from_body * Vector3::x();
-    ahead.y.atan2(ahead.x)
 }
 
 /// The variance about the vertical, from the covariance of a small rotation of the body, rad².

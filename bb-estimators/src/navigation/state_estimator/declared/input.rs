@@ -1,5 +1,6 @@
 //! Inputs of the declared state estimator.
 
+use crate::navigation::estimator::measured::{in_body, of_fix};
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::numbers::UNSTATED_FIX;
 use crate::navigation::state_estimator::{
@@ -159,14 +160,9 @@ impl Mounting {
     /// Reads the mounting that the robot declares.
     pub(super) fn of(context: &Context) -> Result<Self, Fault> {
         let link_from_imu = context.frame_from_driver()?;
-        // `None` for an input that the robot does not declare.
-        let in_body = |input| {
-            let mut pose = context.frame_from_input(input).ok()?;
-            pose.translation.vector -= link_from_imu.translation.vector;
-            Some(pose)
-        };
-        let lever_arm = in_body("gnss").map_or_else(Vector3::zeros, |antenna| antenna.translation.vector);
-        Ok(Self { link_from_imu, lever_arm, body_from_camera: in_body("features") })
+        let body_from = |input: &str| in_body(context, &link_from_imu, input);
+        let lever_arm = body_from("gnss").map_or_else(Vector3::zeros, |antenna| antenna.translation.vector);
+        Ok(Self { link_from_imu, lever_arm, body_from_camera: body_from("features") })
     }
 }
 
@@ -238,12 +234,10 @@ pub(super) fn factor(reading: &Stamped<FactorReading>) -> Option<GivenFactor> {
 
 pub(super) fn fix(fix: &Stamped<GnssFix>, mounting: &Mounting) -> Option<GnssReading> {
     let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
-    let usual =
-        Vector3::new(UNSTATED_FIX * UNSTATED_FIX, UNSTATED_FIX * UNSTATED_FIX, 4.0 * UNSTATED_FIX * UNSTATED_FIX);
     Some(GnssReading {
         time_ns: fix.monotonic_time.as_nanos(),
         position: geodetic(&position)?,
-        covariance: fix.position_covariance.unwrap_or_else(|| Matrix3::from_diagonal(&usual)),
+        covariance: fix.position_covariance.unwrap_or_else(|| of_fix(UNSTATED_FIX)),
         velocity: None,
         lever_arm: mounting.lever_arm,
     })

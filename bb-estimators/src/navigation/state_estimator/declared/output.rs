@@ -1,6 +1,6 @@
 //! Outputs of the declared state estimator.
 
-use crate::navigation::geodesy::Geodetic;
+use crate::navigation::estimator::measured::place_of;
 use crate::navigation::state_estimator::{
     EstimatorHealth, EstimatorOutput, Event, EventKind, HealthState, Level, SourceLabel,
 };
@@ -58,12 +58,11 @@ pub struct FlightEstimate {
 impl FlightEstimate {
     /// Converts an output to a payload.
     pub fn of(output: &EstimatorOutput) -> Self {
-        let Geodetic { latitude, longitude, height } = output.position;
         Self {
             frame_id: *output.frame_id.as_bytes(),
             emitted: MonotonicTime::from_nanos(output.emitted_ns),
             time: MonotonicTime::from_nanos(output.time_ns),
-            position: GeodeticPosition { latitude_rad: latitude, longitude_rad: longitude, altitude: Some(height) },
+            position: place_of(&output.position),
             world_from_body: output.world_from_body,
             velocity: output.velocity,
             covariance: output.covariance,
