@@ -36,7 +36,7 @@ const KNOWN: [Known; 19] = [
     ("simflight_stress", "state-smoother", &[], 1.068, 4.0..7.0),
     ("kitti_s2", "eskf", &[], 0.412, 0.8..4.0),
     ("kitti_s5", "eskf", &[], 1.789, 1.0..4.0),
-    ("kitti_s10", "eskf", &[], 8.784, 1.0..4.0),
+    ("kitti_s10", "eskf", &[], 8.853, 1.0..4.0),
     ("kitti_s2", "eskf", TUNED, 0.368, 0.8..5.0),
     ("kitti_s5", "eskf", TUNED, 1.567, 0.8..5.0),
     ("kitti_s10", "eskf", TUNED, 7.781, 0.8..5.0),
