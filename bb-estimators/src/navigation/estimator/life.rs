@@ -32,7 +32,7 @@ pub(in crate::navigation) trait Starts: Debug {
     /// Status that the filter has beside the odometry.
     type Status;
 
-    /// Gathers anew. `frame` is that of the world, if it already has one.
+    /// Creates one that has gathered nothing. `frame` is that of the world, if it already has one.
     fn new(setup: &Self::Setup, frame: Option<LocalFrame>) -> Self;
 
     /// Adds the new inputs. Returns the start of the filter once it is known, and the frame of its world.
