@@ -1,9 +1,7 @@
 //! Reports on the receiver at random, with stamps of all kinds, among inputs that are late: a model of the gate, which knows all
 //! reports and nothing of the queue, judges every fix in the estimate.
 
-use super::flight::{SECOND, STEP};
 use super::*;
-use crate::navigation::ImuMean;
 use alloc::collections::BTreeMap;
 use bb_tests::laws;
 use proptest::prelude::*;

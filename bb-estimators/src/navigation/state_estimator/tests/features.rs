@@ -1,11 +1,9 @@
 //! Landmarks in the images of a camera.
 
-use super::flight::{FRAME, SECOND, STEP};
-use super::order::answers;
 use super::*;
+use crate::navigation::Camera;
 use crate::navigation::noise::Noise;
-use crate::navigation::{Camera, Refusal};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Rotation3, Vector2};
 
 const PIXEL: f64 = 1.0;
 
@@ -82,7 +80,7 @@ fn flown(flight: &Flight, images: &[ImageFeatures], late_ns: i64) -> Estimator {
 /// Position error, m, and its square over the covariance.
 fn error(flight: &Flight, estimator: &mut Estimator, time_ns: i64) -> (f64, f64) {
     let output = estimator.predicted(time_ns).unwrap();
-    let off = flight.frame.position(&output.position) - Flight::truth(time_ns).position;
+    let off = flight.off(&output);
     let covariance = output.covariance.fixed_view::<3, 3>(0, 0).into_owned();
     (off.norm(), off.dot(&(covariance.try_inverse().unwrap() * off)))
 }
@@ -103,16 +101,16 @@ fn landmarks_are_the_visual_odometry() {
             errors[i] += nees;
         }
         assert_eq!((blind.label(), seeing.label()), (SourceLabel::DeadReckoned, SourceLabel::VisualPropagated));
-        let good = PoseAnchor { time_ns: length * SECOND, ..flight.anchors[0] };
-        let truth = Flight::truth(good.time_ns);
-        let at = |off: Vector3<f64>| flight.frame.geodetic(&(truth.position + off));
-        let wrong = PoseAnchor { position: at(Vector3::new(150.0, -100.0, 0.0)), provider: 1, ..good };
-        let good = PoseAnchor { position: at(Vector3::zeros()), world_from_body: truth.world_from_body, ..good };
-        let wrong = PoseAnchor { world_from_body: truth.world_from_body, ..wrong };
+        let (time_ns, truth) = (length * SECOND, Flight::truth(length * SECOND));
+        let anchor = |provider: u32, off: Vector3<f64>| {
+            let position = flight.frame.geodetic(&(truth.position + off));
+            let world_from_body = truth.world_from_body;
+            PoseAnchor { time_ns, provider, position, world_from_body, ..flight.anchors[0] }
+        };
+        let (good, wrong) = (anchor(0, Vector3::zeros()), anchor(1, Vector3::new(150.0, -100.0, 0.0)));
         assert!(blind.add_pose_anchor(wrong).is_ok(), "{seed}: the IMU alone does not know better");
         let refused = seeing.add_pose_anchor(wrong);
-        let is_refused = matches!(refused, Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. }))));
-        assert!(is_refused, "{seed}: {refused:?}");
+        assert!(is_gated(&refused), "{seed}: {refused:?}");
         match seeing.add_pose_anchor(good) {
             Ok(Added::Taken { nis: Some(nis) }) => anchors += nis,
             other => panic!("{seed}: {other:?}"),
@@ -171,8 +169,7 @@ fn what_is_wrong_is_refused_by_name() {
     ];
     for (image, refusal) in cases {
         let mut estimator = flown(&flight, before, 0);
-        let refused = estimator.add_features(image);
-        assert_eq!(refused, Err(EstimatorError::Degraded(Reason::Refused(refusal))));
+        assert_eq!(estimator.add_features(image), degraded(refusal));
         assert!(estimator.predicted(3 * SECOND).is_some());
     }
     let mut estimator = flown(&flight, before, 0);
@@ -183,18 +180,17 @@ fn what_is_wrong_is_refused_by_name() {
     let twice = image.features[1];
     image.features.push(twice);
     assert!(matches!(estimator.add_features(image.clone()), Ok(Added::Taken { nis: Some(nis) }) if nis < 3.0));
-    assert_eq!(estimator.add_features(image.clone()), Err(EstimatorError::Degraded(Reason::Duplicate)));
+    assert_eq!(estimator.add_features(image.clone()), degraded(Reason::Duplicate));
     let mut estimator = flown(&flight, before, 0);
     image.features.truncate(1);
     let refused = estimator.add_features(image);
-    assert!(matches!(refused, Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. })))), "{refused:?}");
+    assert!(is_gated(&refused), "{refused:?}");
     // Without a camera, or without a window, nothing says where a landmark is.
     for strategy in StrategyKind::ALL {
         let mut estimator = started(&flight, *strategy);
         flight.sent(false, false, false).iter().for_each(|sent| sent.to(&mut estimator).unwrap());
         let refused = estimator.add_features(last.clone());
-        let reason = Reason::Refused(Refusal::NotObservable);
-        assert_eq!(refused, Err(EstimatorError::Degraded(reason)), "{strategy:?}");
+        assert_eq!(refused, degraded(Refusal::NotObservable), "{strategy:?}");
     }
     let lens = Camera { focal_length: Vector2::new(0.0, 400.0), ..camera() };
     let config = StateEstimatorConfig { camera: Some(lens), ..StateEstimatorConfig::default() };

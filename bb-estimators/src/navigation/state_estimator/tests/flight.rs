@@ -1,11 +1,9 @@
 //! A flight as sums of sinusoids, and its sensor measurements.
 
 use super::*;
-use crate::navigation::eskf::ImuMean;
-use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::{rotation, rotation_vector};
 use crate::navigation::noise::Noise;
-use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Rotation3;
 
 pub(super) const SECOND: i64 = 1_000_000_000;
 pub(super) const STEP: i64 = SECOND / 200;
@@ -28,7 +26,6 @@ pub(super) enum Sent {
     Anchor(PoseAnchor),
     Fix(GnssReading),
     Health(GpsHealthReading),
-    Attitude(AttitudeReading),
 }
 
 impl Sent {
@@ -39,23 +36,34 @@ impl Sent {
             Self::Anchor(anchor) => anchor.time_ns,
             Self::Fix(fix) => fix.time_ns,
             Self::Health(health) => health.time_ns,
-            Self::Attitude(attitude) => attitude.time_ns,
         }
     }
 
     /// Returns the flight on a clock that is behind by `by_ns`.
-    pub(super) fn behind(&self, by_ns: i64) -> Self {
-        match *self {
-            Self::Imu(sample) => Self::Imu(ImuMean { time_ns: sample.time_ns - by_ns, ..sample }),
+    pub(super) fn behind(mut self, by_ns: i64) -> Self {
+        match &mut self {
+            Self::Imu(sample) => sample.time_ns -= by_ns,
             Self::Vio(vio) => {
-                Self::Vio(VioOutput { from_ns: vio.from_ns - by_ns, to_ns: vio.to_ns - by_ns, ..vio })
+                vio.from_ns -= by_ns;
+                vio.to_ns -= by_ns;
             }
-            Self::Anchor(anchor) => Self::Anchor(PoseAnchor { time_ns: anchor.time_ns - by_ns, ..anchor }),
-            Self::Fix(fix) => Self::Fix(GnssReading { time_ns: fix.time_ns - by_ns, ..fix }),
-            Self::Health(health) => Self::Health(GpsHealthReading { time_ns: health.time_ns - by_ns, ..health }),
-            Self::Attitude(attitude) => {
-                Self::Attitude(AttitudeReading { time_ns: attitude.time_ns - by_ns, ..attitude })
-            }
+            Self::Anchor(anchor) => anchor.time_ns -= by_ns,
+            Self::Fix(fix) => fix.time_ns -= by_ns,
+            Self::Health(health) => health.time_ns -= by_ns,
+        }
+        self
+    }
+
+    /// Returns the input on a clock that is set back by `by_ns` at a time.
+    pub(super) fn set_back(&self, jump_ns: i64, by_ns: i64) -> Self {
+        self.behind(if self.time_ns() >= jump_ns { by_ns } else { 0 })
+    }
+
+    /// Returns a report on the receiver with another health. Any other input is returned as it is.
+    pub(super) fn reporting(&self, health: GpsHealth) -> Self {
+        match *self {
+            Self::Health(reading) => Self::Health(GpsHealthReading { health, ..reading }),
+            sent => sent,
         }
     }
 
@@ -65,10 +73,20 @@ impl Sent {
             Self::Vio(vio) => estimator.add_vio(*vio).map(drop),
             Self::Anchor(anchor) => estimator.add_pose_anchor(*anchor).map(drop),
             Self::Fix(fix) => estimator.add_gnss(*fix).map(drop),
-            Self::Attitude(attitude) => estimator.add_attitude(*attitude).map(drop),
             Self::Health(health) => estimator.add_gps_health(*health).map(drop),
         }
     }
+}
+
+/// What became of an input.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Flown {
+    /// Its time before it was changed.
+    pub(super) at_ns: i64,
+    pub(super) sent: Sent,
+    pub(super) result: Result<(), EstimatorError>,
+    /// Output of the tick that follows.
+    pub(super) output: Option<EstimatorOutput>,
 }
 
 /// Measurements since the start.
@@ -132,6 +150,14 @@ impl Flight {
         State { position, velocity, world_from_body: attitude(seconds(time_ns)) }
     }
 
+    /// The relative pose between two times, without noise.
+    pub(super) fn relative(from_ns: i64, to_ns: i64) -> VioOutput {
+        let (from, to) = (Self::truth(from_ns), Self::truth(to_ns));
+        let back = from.world_from_body.inverse();
+        let (translation, from_to) = (back * (to.position - from.position), back * to.world_from_body);
+        VioOutput { from_ns, to_ns, translation, from_to, covariance: diagonal(0.01, 1e-3), bias: None }
+    }
+
     pub(super) fn new(length_s: i64, seed: u64) -> Self {
         let mut noise = Noise::new(seed);
         let [gyroscope_bias, accelerometer_bias] = [noise.vector(0.01), noise.vector(0.1)];
@@ -156,16 +182,12 @@ impl Flight {
         let samples = samples.collect();
         let vio = (1..=end / FRAME).map(|i| {
             let (from_ns, to_ns) = ((i - 1) * FRAME, i * FRAME);
-            let (from, to) = (Self::truth(from_ns), Self::truth(to_ns));
-            let turn = from.world_from_body.inverse() * to.world_from_body;
-            let way = from.world_from_body.inverse() * (to.position - from.position);
+            let VioOutput { translation, from_to, .. } = Self::relative(from_ns, to_ns);
             VioOutput {
-                from_ns,
-                to_ns,
-                translation: way + noise.vector(0.02),
-                from_to: turn * rotation(&noise.vector(1e-3)),
+                translation: translation + noise.vector(0.02),
+                from_to: from_to * rotation(&noise.vector(1e-3)),
                 covariance: diagonal(0.02, 1e-3),
-                bias: None,
+                ..Self::relative(from_ns, to_ns)
             }
         });
         let vio = vio.collect();
@@ -244,11 +266,38 @@ impl Flight {
         sent
     }
 
+    /// A position that is moved, m.
+    pub(super) fn moved(&self, position: &Geodetic, by: Vector3<f64>) -> Geodetic {
+        self.frame.geodetic(&(self.frame.position(position) + by))
+    }
+
+    /// A fix or an anchor that is moved, m. Any other input is returned as it is.
+    pub(super) fn moving(&self, sent: &Sent, by: Vector3<f64>) -> Sent {
+        match *sent {
+            Sent::Fix(fix) => Sent::Fix(GnssReading { position: self.moved(&fix.position, by), ..fix }),
+            Sent::Anchor(anchor) => {
+                Sent::Anchor(PoseAnchor { position: self.moved(&anchor.position, by), ..anchor })
+            }
+            sent => sent,
+        }
+    }
+
+    /// What a position is off by from the truth, m.
+    pub(super) fn off(&self, output: &EstimatorOutput) -> Vector3<f64> {
+        self.frame.position(&output.position) - Self::truth(output.time_ns).position
+    }
+
+    /// What a velocity is off by from the truth, in the axes of the place, m/s.
+    pub(super) fn velocity_error(&self, output: &EstimatorOutput) -> f64 {
+        let turn = self.frame.other_from_self(&LocalFrame::new(output.position)).rotation;
+        (output.velocity - turn * Self::truth(output.time_ns).velocity).norm()
+    }
+
     /// Position error, m, and rotation error, rad, of an estimate at its time.
     pub(super) fn error(&self, output: &EstimatorOutput) -> (f64, f64) {
         let truth = Self::truth(output.time_ns);
         let turn = self.frame.other_from_self(&LocalFrame::new(output.position)).rotation;
         let turned = output.world_from_body * (turn * truth.world_from_body).inverse();
-        ((self.frame.position(&output.position) - truth.position).norm(), rotation_vector(&turned).norm())
+        (self.off(output).norm(), rotation_vector(&turned).norm())
     }
 }

@@ -1,11 +1,7 @@
 //! Factors of outside providers that are plain data, and relative poses between any two frames.
 
-use super::flight::{FRAME, SECOND, STEP};
-use super::order::answers;
 use super::*;
-use crate::navigation::Refusal;
-use crate::navigation::geodesy::{Geodetic, LocalFrame};
-use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::Vector6;
 
 fn pose(flight: &Flight, time_ns: i64) -> (Geodetic, UnitQuaternion<f64>) {
     let truth = Flight::truth(time_ns);
@@ -31,21 +27,8 @@ fn linear(flight: &Flight, time_ns: i64) -> GivenFactor {
     GivenFactor { time_ns, provider: 1, form }
 }
 
-fn vio(from_ns: i64, to_ns: i64) -> VioOutput {
-    let (from, to) = (Flight::truth(from_ns), Flight::truth(to_ns));
-    let back = from.world_from_body.inverse();
-    VioOutput {
-        from_ns,
-        to_ns,
-        translation: back * (to.position - from.position),
-        from_to: back * to.world_from_body,
-        covariance: Matrix6::from_diagonal(&Vector6::new(1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)),
-        bias: None,
-    }
-}
-
 fn relative(from_ns: i64, time_ns: i64) -> GivenFactor {
-    let VioOutput { translation, from_to, covariance, .. } = vio(from_ns, time_ns);
+    let VioOutput { translation, from_to, covariance, .. } = Flight::relative(from_ns, time_ns);
     let form = FactorForm::Relative(RelativeFactor { from_ns, translation, from_to, covariance });
     GivenFactor { time_ns, provider: 2, form }
 }
@@ -66,14 +49,12 @@ fn rows_on_the_pose_are_taken_by_every_strategy() {
             // Also between two frames: the camera's relative pose is then one between keyframes that are not neighbours.
             let time_ns = i * FRAME + if i % 2 == 0 { 3 * STEP } else { 0 };
             let taken = estimator.add_given_factor(linear(&flight, time_ns));
-            assert!(
-                matches!(taken, Ok(Added::Taken { nis: Some(nis) }) if nis < 10.0),
-                "{strategy:?} {i}: {taken:?}"
-            );
+            let is_taken = matches!(taken, Ok(Added::Taken { nis: Some(nis) }) if nis < 10.0);
+            assert!(is_taken, "{strategy:?} {i}: {taken:?}");
         }
         assert_eq!(count(estimator.sink(), "degraded"), 0, "{strategy:?}");
         let output = estimator.predicted(3 * SECOND).unwrap();
-        let off = flight.frame.position(&output.position) - Flight::truth(3 * SECOND).position;
+        let off = flight.off(&output);
         let sigma = |i: usize| output.covariance[(i, i)].sqrt();
         assert!(off.xy().norm() < 0.1, "{strategy:?}: {off}");
         assert!(sigma(0) < 0.05 && sigma(1) < 0.05 && sigma(2) > 0.5, "{strategy:?}: {}", output.covariance);
@@ -115,14 +96,12 @@ fn relative_poses_of_any_two_keyframes() {
             for span in [2, 5, 9] {
                 let (from_ns, to_ns) = ((to - span) * FRAME, to * FRAME);
                 for (provider, added) in [
-                    ("camera", estimator.add_vio(vio(from_ns, to_ns))),
+                    ("camera", estimator.add_vio(Flight::relative(from_ns, to_ns))),
                     ("provider", estimator.add_given_factor(relative(from_ns, to_ns))),
                 ] {
                     if is_smoother {
-                        assert!(
-                            matches!(added, Ok(Added::Taken { nis: Some(nis) }) if nis < 5.0),
-                            "{provider}: {added:?}"
-                        );
+                        let is_taken = matches!(added, Ok(Added::Taken { nis: Some(nis) }) if nis < 5.0);
+                        assert!(is_taken, "{provider}: {added:?}");
                     } else {
                         let text = format!("degraded: there is no keyframe at {from_ns} ns, or none any more");
                         assert_eq!(added.unwrap_err().to_string(), text, "{provider}");
@@ -131,7 +110,7 @@ fn relative_poses_of_any_two_keyframes() {
             }
         }
         let again = estimator.add_given_factor(relative(21 * FRAME, 30 * FRAME));
-        assert_eq!(again, Err(EstimatorError::Degraded(Reason::Duplicate)));
+        assert_eq!(again, degraded(Reason::Duplicate));
         let output = estimator.predicted(3 * SECOND).unwrap();
         let [sigma, from] = [output, before].map(|output| output.covariance.trace());
         assert_eq!(sigma < from, is_smoother, "{strategy:?}: {sigma}, {from}");
@@ -221,18 +200,13 @@ fn what_is_wrong_is_refused_by_name() {
         let mut estimator = flown(&flight, *strategy);
         let before = answers(&mut estimator);
         for (factor, refusal) in &cases {
-            let refused = estimator.add_given_factor(*factor);
-            assert_eq!(
-                refused,
-                Err(EstimatorError::Degraded(Reason::Refused(*refusal))),
-                "{strategy:?} {factor:?}"
-            );
+            assert_eq!(estimator.add_given_factor(*factor), degraded(*refusal), "{strategy:?} {factor:?}");
         }
         assert_eq!(count(estimator.sink(), "degraded"), cases.len());
         assert_eq!(before, answers(&mut estimator), "{strategy:?}: what is refused changes nothing");
         // One that does not fit meets the gate.
         let wrong = of_linear(&|linear| linear.residual[0] += 50.0);
         let wrong = estimator.add_given_factor(GivenFactor { provider: 7, ..wrong });
-        assert!(matches!(wrong, Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. })))), "{wrong:?}");
+        assert!(is_gated(&wrong), "{wrong:?}");
     }
 }

@@ -1,8 +1,6 @@
 //! The requirements of the source label.
 
-use super::flight::SECOND;
 use super::*;
-use crate::navigation::ImuMean;
 
 /// Labels with their times, s, of a flight with camera, anchors and fixes only at some times.
 fn timeline(
@@ -13,37 +11,21 @@ fn timeline(
 ) -> (Vec<(i64, SourceLabel)>, Vec<EstimatorOutput>) {
     let flight = Flight::new(40, 3);
     let mut estimator = started(&flight, strategy);
-    let mut outputs = Vec::new();
-    for sent in &flight.sent(true, true, true) {
-        let time_ns = sent.time_ns();
-        let second = time_ns / SECOND;
-        match sent {
-            Sent::Vio(_) if !sees(second) => continue,
-            Sent::Anchor(_) if !anchors(second) => continue,
-            Sent::Fix(_) if !fixes(second) => continue,
-            // After a loss, the first relative pose has no keyframe, or fits badly.
-            sent => ignore(sent.to(&mut estimator)),
-        }
-        outputs.extend(estimator.tick(time_ns));
-    }
+    let flown = fly(&mut estimator, &flight.sent(true, true, true), |sent| {
+        let second = sent.time_ns() / SECOND;
+        let is_sent = match sent {
+            Sent::Vio(_) => sees(second),
+            Sent::Anchor(_) => anchors(second),
+            Sent::Fix(_) => fixes(second),
+            _ => true,
+        };
+        is_sent.then_some(*sent)
+    });
     let labels = kinds(estimator.sink(), "label").map(|event| match event.kind {
         EventKind::Label { to, .. } => (event.time_ns / SECOND, to),
         _ => unreachable!(),
     });
-    (labels.collect(), outputs)
-}
-
-#[test]
-fn the_label_goes_from_dead_reckoned_to_anchored_to_visual_and_back() {
-    for strategy in StrategyKind::ALL {
-        let (labels, outputs) = timeline(*strategy, |_| true, |second| !(5..15).contains(&second), |_| false);
-        use SourceLabel::{SatelliteAnchored, VisualPropagated};
-        assert_eq!(labels, [(1, SatelliteAnchored), (7, VisualPropagated), (15, SatelliteAnchored)]);
-        for output in outputs {
-            let Some(age_ms) = output.anchor_age_ms else { continue };
-            assert_eq!(output.label == SatelliteAnchored, age_ms <= 3000, "{output:?}");
-        }
-    }
+    (labels.collect(), flown.into_iter().filter_map(|flown| flown.output).collect())
 }
 
 /// A trusted receiver bounds the position as anchors do, but the age is that of anchors alone.
@@ -52,7 +34,7 @@ fn fixes_keep_the_label_and_not_the_age_of_the_anchor() {
     for strategy in StrategyKind::ALL {
         let (labels, outputs) = timeline(*strategy, |_| true, |second| second < 5, |second| second >= 6);
         assert_eq!(labels, [(1, SourceLabel::SatelliteAnchored)]);
-        let last_ns = 4 * SECOND + 3 * super::flight::STEP;
+        let last_ns = 4 * SECOND + 3 * STEP;
         for output in outputs.iter().filter(|output| output.time_ns >= 5 * SECOND) {
             let age_ns = output.anchor_age_ms.map(|age_ms| age_ms as i64 * 1_000_000);
             assert_eq!(age_ns, Some(output.time_ns - last_ns), "{output:?}");
@@ -63,34 +45,21 @@ fn fixes_keep_the_label_and_not_the_age_of_the_anchor() {
     }
 }
 
+/// The camera returns at 20 s and improves the velocity. Only the anchor determines the position.
 #[test]
-fn visual_loss_demotes_to_dead_reckoning_until_the_next_anchor() {
+fn visual_loss_demotes_to_dead_reckoning_that_grows_until_the_next_anchor() {
+    use SourceLabel::{DeadReckoned, SatelliteAnchored};
+    let flight = Flight::new(1, 3);
     for strategy in StrategyKind::ALL {
-        let (labels, _) = timeline(
+        let (labels, outputs) = timeline(
             *strategy,
             |second| !(10..20).contains(&second),
             |second| !(10..25).contains(&second),
             |_| false,
         );
-        use SourceLabel::{DeadReckoned, SatelliteAnchored};
         assert_eq!(labels, [(1, SatelliteAnchored), (10, DeadReckoned), (25, SatelliteAnchored)]);
-    }
-}
-
-#[test]
-fn while_dead_reckoning_the_covariance_grows_monotonically() {
-    for strategy in StrategyKind::ALL {
-        // The camera returns at 20 s and improves the velocity. Only the anchor determines the position.
-        let (_, outputs) = timeline(
-            *strategy,
-            |second| !(10..20).contains(&second),
-            |second| !(10..25).contains(&second),
-            |_| false,
-        );
-        let lost: Vec<_> = outputs
-            .iter()
-            .filter(|output| output.label == SourceLabel::DeadReckoned && output.time_ns > SECOND * 5)
-            .collect();
+        let lost: Vec<_> =
+            outputs.iter().filter(|output| output.label == DeadReckoned && output.time_ns > SECOND * 5).collect();
         assert!(lost.len() > 65, "{}", lost.len());
         let trace = |output: &EstimatorOutput, first: usize| {
             (first..first + 3).map(|i| output.covariance[(i, i)]).sum::<f64>()
@@ -103,26 +72,18 @@ fn while_dead_reckoning_the_covariance_grows_monotonically() {
             let decomposed = nalgebra::linalg::Cholesky::new(two[1].covariance);
             assert!(decomposed.is_some(), "it is still a covariance");
         }
-        let first = lost[0].quality.covariance_norm;
-        let last = lost[lost.len() - 1].quality.covariance_norm;
+        let [first, last] = [lost[0], lost[lost.len() - 1]].map(|output| output.quality.covariance_norm);
         assert!(last > 20.0 * first, "{first} to {last}");
-        let flight = Flight::new(1, 3);
         for output in lost {
-            let deviation = trace(output, 0).sqrt();
-            assert!(
-                flight.error(output).0 < 4.0 * deviation,
-                "{} m, deviation {deviation} m",
-                flight.error(output).0
-            );
+            let (error_m, deviation_m) = (flight.error(output).0, trace(output, 0).sqrt());
+            assert!(error_m < 4.0 * deviation_m, "{error_m} m, deviation {deviation_m} m");
         }
     }
 }
 
 #[test]
 fn growth_of_the_covariance_is_in_the_health_and_warned_of_once() {
-    let flight = Flight::new(30, 3);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
+    for (_, flight, mut estimator) in flights(30, 3) {
         for sent in &flight.sent(true, true, false) {
             if sent.time_ns() < 15 * SECOND || matches!(sent, Sent::Imu(_)) {
                 sent.to(&mut estimator).unwrap();
@@ -140,9 +101,7 @@ fn growth_of_the_covariance_is_in_the_health_and_warned_of_once() {
 /// A warm start after the estimate was lost is as uncertain as the flight controller says, and not as what was lost.
 #[test]
 fn a_warm_start_begins_the_covariance_anew() {
-    let flight = Flight::new(22, 4);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
+    for (strategy, flight, mut estimator) in flights(22, 4) {
         let (mut before, mut after) = (0.0_f64, None);
         for sample in &flight.samples[1..] {
             // After 20 s of dead reckoning, the clock jumps by more than a gap may last.
@@ -160,7 +119,7 @@ fn a_warm_start_begins_the_covariance_anew() {
             match sample.time_ns > 20 * SECOND {
                 false => before = output.covariance.norm(),
                 true => {
-                    assert!(output.covariance.norm() < 1.001 * own, "{}: {output:?}, not {own}", strategy.name());
+                    assert!(output.covariance.norm() < 1.001 * own, "{strategy:?}: {output:?}, not {own}");
                     after.get_or_insert(own);
                 }
             }

@@ -1,11 +1,7 @@
 //! Late samples of the IMU share one run, and every estimate that is read contains them all.
 
-use super::flight::{SECOND, STEP};
-use super::order::answers;
 use super::*;
-use crate::navigation::{GnssPosition, ImuMean};
 use bb_tests::laws;
-use nalgebra::Vector3;
 use proptest::prelude::*;
 
 /// A way to read the estimate.
@@ -36,10 +32,6 @@ fn read(estimator: &mut Estimator, read: Read, now_ns: i64) -> impl PartialEq + 
     (outputs, frame, known.map(|(label, health)| (label, health.gate, health.state, health.keyframes)))
 }
 
-fn add_all(estimator: &mut Estimator, samples: &[ImuMean]) {
-    samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
-}
-
 /// Returns an estimator in flight for two seconds, and 40 samples, every other one, that are held back until the end.
 fn with_samples_held_back(flight: &Flight, strategy: StrategyKind) -> (Estimator, Vec<ImuMean>) {
     let is_held = |sample: &ImuMean| {
@@ -55,77 +47,62 @@ fn with_samples_held_back(flight: &Flight, strategy: StrategyKind) -> (Estimator
 #[test]
 fn samples_of_before_an_outage_that_come_after_it_are_late() {
     let flight = Flight::new(9, 3);
-    for strategy in StrategyKind::ALL {
-        for (every, silent_ns) in [(2, SECOND / 2), (20, SECOND), (5, 11 * SECOND / 10)] {
-            let (from_ns, to_ns) = (4 * SECOND, 4 * SECOND + silent_ns);
-            let is_held = |time_ns: i64| {
-                (from_ns - 4 * SECOND / 5..from_ns).contains(&time_ns) && (time_ns / STEP) % every == 0
-            };
-            let (mut late, mut in_order) = (started(&flight, *strategy), started(&flight, *strategy));
-            let mut held = Vec::new();
-            for sent in flight.sent(true, true, true) {
-                let time_ns = sent.time_ns();
-                match sent {
-                    Sent::Imu(_) if (from_ns..to_ns).contains(&time_ns) => continue,
-                    Sent::Imu(sample) if is_held(time_ns) => held.push(sample),
-                    sent => ignore(sent.to(&mut late)),
-                }
-                ignore(sent.to(&mut in_order));
-                if matches!(sent, Sent::Imu(_)) && time_ns >= to_ns {
-                    add_all(&mut late, &core::mem::take(&mut held));
-                }
+    for (strategy, (every, silent_ns)) in each([(2, SECOND / 2), (20, SECOND), (5, 11 * SECOND / 10)]) {
+        let (from_ns, to_ns) = (4 * SECOND, 4 * SECOND + silent_ns);
+        let is_held =
+            |time_ns: i64| (from_ns - 4 * SECOND / 5..from_ns).contains(&time_ns) && (time_ns / STEP) % every == 0;
+        let (mut late, mut in_order) = (started(&flight, strategy), started(&flight, strategy));
+        let mut held = Vec::new();
+        for sent in flight.sent(true, true, true) {
+            let time_ns = sent.time_ns();
+            match sent {
+                Sent::Imu(_) if (from_ns..to_ns).contains(&time_ns) => continue,
+                Sent::Imu(sample) if is_held(time_ns) => held.push(sample),
+                sent => ignore(sent.to(&mut late)),
             }
-            assert_eq!(
-                (late.counts().set_back, late.counts().too_old),
-                (0, 0),
-                "{strategy:?}: {every}, {silent_ns}"
-            );
-            assert_eq!(late.predicted(9 * SECOND), in_order.predicted(9 * SECOND), "{strategy:?}");
+            ignore(sent.to(&mut in_order));
+            if matches!(sent, Sent::Imu(_)) && time_ns >= to_ns {
+                add_all(&mut late, &core::mem::take(&mut held));
+            }
         }
+        let counts = late.counts();
+        assert_eq!((counts.set_back, counts.too_old), (0, 0), "{strategy:?}: {every}, {silent_ns}");
+        assert_eq!(late.predicted(9 * SECOND), in_order.predicted(9 * SECOND), "{strategy:?}");
     }
 }
 
+/// A burst is run once, for a reader; or with the next input, or after a quarter of a second of samples, for a user
+/// who reads events only.
 #[test]
-fn a_burst_of_late_samples_is_run_once() {
-    let flight = Flight::new(2, 3);
+fn a_burst_of_late_samples_is_run_once_and_does_not_wait_for_a_reader() {
+    let (flight, later) = (Flight::new(2, 3), Flight::new(3, 3));
     for strategy in StrategyKind::ALL {
-        let (mut estimator, held) = with_samples_held_back(&flight, *strategy);
-        let (before, without) = (*estimator.counts(), estimator.predicted(2 * SECOND));
-        add_all(&mut estimator, &held);
-        assert_eq!((held.len(), estimator.counts().late - before.late), (40, 40), "each is counted");
+        let burst = || {
+            let (mut estimator, held) = with_samples_held_back(&flight, *strategy);
+            let (before, without) = (*estimator.counts(), estimator.predicted(2 * SECOND));
+            add_all(&mut estimator, &held);
+            assert_eq!((held.len(), estimator.counts().late - before.late), (40, 40), "each is counted");
+            (estimator, without, before.reruns)
+        };
+        let (mut estimator, without, before) = burst();
         let with = estimator.predicted(2 * SECOND);
-        assert_eq!(estimator.counts().reruns - before.reruns, 1, "{}", strategy.name());
         assert!(with.is_some() && with != without);
         // What has not changed is not run again.
         READS.iter().for_each(|by| drop(read(&mut estimator, *by, 2 * SECOND)));
-        assert_eq!(estimator.counts().reruns - before.reruns, 1, "{}", strategy.name());
-    }
-}
+        assert_eq!(estimator.counts().reruns, before + 1, "{strategy:?}");
 
-/// A user who reads events only: they are in the estimate with the next input, or after a quarter of a second of samples.
-#[test]
-fn late_samples_do_not_wait_for_a_reader() {
-    let (flight, later) = (Flight::new(2, 3), Flight::new(3, 3));
-    for strategy in StrategyKind::ALL {
-        for is_input in [true, false] {
-            let (mut estimator, held) = with_samples_held_back(&flight, *strategy);
-            let before = estimator.counts().reruns;
-            add_all(&mut estimator, &held);
-            let (sample, rest) = later.samples[400..].split_first().unwrap();
-            add_all(&mut estimator, core::slice::from_ref(sample));
-            assert_eq!(estimator.counts().reruns, before);
-            if is_input {
-                let health = GpsHealth::NoFix;
-                estimator.add_gps_health(GpsHealthReading { time_ns: sample.time_ns, health }).unwrap();
-            } else {
-                let until_ns = 2 * SECOND + SECOND / 4;
-                let count = rest.iter().take_while(|sample| sample.time_ns <= until_ns).count();
-                add_all(&mut estimator, &rest[..count]);
-                assert_eq!(estimator.counts().reruns, before);
-                add_all(&mut estimator, &rest[count..=count]);
-            }
-            assert_eq!(estimator.counts().reruns, before + 1, "{}", strategy.name());
-        }
+        let (mut estimator, _, before) = burst();
+        add_all(&mut estimator, &later.samples[400..401]);
+        assert_eq!(estimator.counts().reruns, before);
+        let (time_ns, health) = (later.samples[400].time_ns, GpsHealth::NoFix);
+        estimator.add_gps_health(GpsHealthReading { time_ns, health }).unwrap();
+        assert_eq!(estimator.counts().reruns, before + 1, "{strategy:?}, with an input");
+
+        let (mut estimator, _, before) = burst();
+        add_all(&mut estimator, &later.samples[400..450]);
+        assert_eq!(estimator.counts().reruns, before);
+        add_all(&mut estimator, &later.samples[450..451]);
+        assert_eq!(estimator.counts().reruns, before + 1, "{strategy:?}, after a quarter of a second");
     }
 }
 
@@ -177,16 +154,16 @@ fn a_relative_pose_that_is_early_finds_the_frame_it_begins_at() {
                 }
                 estimator.add_imu(sample).unwrap();
                 if sample.time_ns == vio.to_ns && !is_early {
-                    assert!(matches!(estimator.add_vio(vio), Ok(Added::Taken { .. })), "{}", strategy.name());
+                    assert!(matches!(estimator.add_vio(vio), Ok(Added::Taken { .. })), "{strategy:?}");
                 }
             }
-            assert_eq!(count(estimator.sink(), "degraded"), 0, "{}", strategy.name());
+            assert_eq!(count(estimator.sink(), "degraded"), 0, "{strategy:?}");
             estimator
         };
         let [mut early, mut late] = [run(true), run(false)];
         for by in READS {
             let (found, expected) = [&mut early, &mut late].map(|estimator| read(estimator, by, 2 * SECOND)).into();
-            assert_eq!(found, expected, "{}, {by:?}", strategy.name());
+            assert_eq!(found, expected, "{strategy:?}, {by:?}");
         }
     }
 }

@@ -1,9 +1,7 @@
 //! Outages of the IMU after which the attitude is unknown: no estimate is trusted that is wrong, and each is trusted again.
 
-use super::flight::{FRAME, SECOND};
 use super::*;
 use crate::navigation::math::rotation;
-use nalgebra::Vector3;
 
 /// Results of flights.
 #[derive(Debug, Default)]
@@ -38,13 +36,13 @@ impl Seen {
     }
 
     /// Flies with these inputs, as `change` leaves them, without the IMU for a time.
-    fn fly(
+    fn fly<T: Into<Option<Sent>>>(
         &mut self,
         flight: &Flight,
         sent: &[Sent],
         (from_ns, for_ns): (i64, i64),
         until_ns: i64,
-        change: impl Fn(&Sent) -> Option<Sent>,
+        change: impl Fn(&Sent) -> T,
     ) {
         let mut estimator = started(flight, StrategyKind::Eskf);
         let is_silent = |time_ns: i64| (from_ns..from_ns + for_ns).contains(&time_ns);
@@ -53,7 +51,7 @@ impl Seen {
             if matches!(sent, Sent::Imu(_)) && is_silent(sent.time_ns()) {
                 continue;
             }
-            let Some(sent) = change(sent) else { continue };
+            let Some(sent) = change(sent).into() else { continue };
             ignore(sent.to(&mut estimator));
             let Sent::Imu(sample) = sent else { continue };
             let Some(output) = estimator.tick(sample.time_ns) else { continue };
@@ -67,7 +65,7 @@ impl Seen {
             }
             self.trusted += 1;
             again_ns = again_ns.or(Some(sample.time_ns - from_ns - for_ns));
-            let off = flight.frame.position(&output.position) - Flight::truth(output.time_ns).position;
+            let off = flight.off(&output);
             let is_wrong = |i: usize| off[i].abs() > 4.0 * output.covariance[(i, i)].sqrt();
             self.wrong += usize::from((0..3).any(is_wrong));
         }
@@ -78,59 +76,57 @@ impl Seen {
     }
 }
 
-fn spoofed(sent: &Sent) -> Option<Sent> {
-    Some(match sent {
-        Sent::Health(reading) => Sent::Health(GpsHealthReading { health: GpsHealth::Spoofed, ..*reading }),
-        sent => *sent,
-    })
-}
-
-/// Outages of 2 and 10 s at many times, two seeds.
-fn flights(with_vio: bool, with_anchors: bool, change: impl Fn(&Sent) -> Option<Sent>) -> Seen {
-    let mut seen = Seen::default();
-    for seed in [3, 11] {
-        let flight = Flight::new(50, seed);
-        let sent = flight.sent(with_vio, with_anchors, true);
-        for (from_s, for_s) in [(3, 2), (10, 2), (23, 2), (27, 2), (2, 10), (9, 10), (17, 10), (27, 10)] {
-            let outage = (from_s * SECOND, for_s * SECOND);
-            seen.fly(&flight, &sent, outage, outage.0 + outage.1 + 12 * SECOND, &change);
+/// Moves and turns the first anchor after a time.
+fn misplacing(
+    flight: &Flight,
+    after_ns: i64,
+    by: Vector3<f64>,
+    turn: Vector3<f64>,
+) -> impl Fn(&Sent) -> Option<Sent> {
+    move |sent| match flight.moving(sent, by) {
+        Sent::Anchor(anchor) if (after_ns..after_ns + SECOND).contains(&anchor.time_ns) => {
+            let world_from_body = rotation(&turn) * anchor.world_from_body;
+            Some(Sent::Anchor(PoseAnchor { world_from_body, ..anchor }))
         }
+        _ => Some(*sent),
     }
-    seen
 }
 
-#[test]
-fn with_a_receiver_alone_it_is_trusted_again_and_right() {
-    let seen = flights(false, false, |sent| Some(*sent));
-    assert!(seen.is_honest() && seen.trusted > 600, "{seen:?}");
-    assert!(seen.never.is_empty() && seen.median_s() < 3.0 && seen.longest_s() < 8.0, "{seen:?}");
-}
+/// Seeds of flights, outages in each of them with their starts and lengths, s, and the time that is looked at after
+/// each, s.
+type Outages = (&'static [u64], &'static [(i64, i64)], i64);
 
+const MANY: Outages = (&[3, 11], &[(3, 2), (10, 2), (23, 2), (27, 2), (2, 10), (9, 10), (17, 10), (27, 10)], 12);
+const LONG: Outages = (&[5], &[(3, 10), (6, 10), (9, 10), (12, 10), (15, 10)], 25);
+
+/// After 10 s, the attitude may be so wrong that it takes a newcomer.
 #[test]
-fn with_positions_alone_it_takes_longer() {
-    let change = |sent: &Sent| {
-        Some(match sent {
-            Sent::Fix(fix) => Sent::Fix(GnssReading { velocity: None, ..*fix }),
-            sent => *sent,
-        })
+fn it_is_trusted_again_and_right() {
+    let as_it_is: fn(&Sent) -> Sent = |sent| *sent;
+    let without_velocity: fn(&Sent) -> Sent = |sent| match sent {
+        Sent::Fix(fix) => Sent::Fix(GnssReading { velocity: None, ..*fix }),
+        sent => *sent,
     };
-    let mut seen = Seen::default();
-    let flight = Flight::new(50, 5);
-    let sent = flight.sent(false, false, true);
-    for from_s in [3, 6, 9, 12, 15] {
-        seen.fly(&flight, &sent, (from_s * SECOND, 10 * SECOND), (from_s + 35) * SECOND, change);
-    }
-    assert!(seen.is_honest() && seen.trusted > 200, "{seen:?}");
-    assert!(seen.never.is_empty() && seen.longest_s() < 20.0, "{seen:?}");
-}
-
-#[test]
-fn with_anchors_it_is_trusted_from_the_second_on() {
-    for with_vio in [true, false] {
-        let seen = flights(with_vio, true, spoofed);
-        // After 10 s, the attitude may be so wrong that it takes a newcomer.
-        assert!(seen.is_honest() && seen.trusted > 600, "{seen:?}");
-        assert!(seen.never.len() <= 2 && seen.median_s() < 2.0 && seen.longest_s() < 2.7, "{seen:?}");
+    let spoofed: fn(&Sent) -> Sent = |sent| sent.reporting(GpsHealth::Spoofed);
+    // At least so many trusted outputs, at most so many outages that none follows, and the median and the longest
+    // time until one does, s.
+    for (what, [with_vio, with_anchors], change, (seeds, outages, then_s), trusted, never, [median_s, longest_s]) in [
+        ("a receiver alone", [false, false], as_it_is, MANY, 600, 0, [3.0, 8.0]),
+        ("positions alone take longer", [false, false], without_velocity, LONG, 200, 0, [20.0, 20.0]),
+        ("anchors and a camera, a spoofed receiver", [true, true], spoofed, MANY, 600, 2, [2.0, 2.7]),
+        ("anchors alone beside it: from the second on", [false, true], spoofed, MANY, 600, 2, [2.0, 2.7]),
+    ] {
+        let mut seen = Seen::default();
+        for seed in seeds {
+            let flight = Flight::new(50, *seed);
+            let sent = flight.sent(with_vio, with_anchors, true);
+            for (from_s, for_s) in outages {
+                let outage = (from_s * SECOND, for_s * SECOND);
+                seen.fly(&flight, &sent, outage, (from_s + for_s + then_s) * SECOND, change);
+            }
+        }
+        assert!(seen.is_honest() && seen.trusted > trusted && seen.never.len() <= never, "{what}: {seen:?}");
+        assert!(seen.median_s() < median_s && seen.longest_s() < longest_s, "{what}: {seen:?}");
     }
 }
 
@@ -141,18 +137,8 @@ fn an_anchor_that_is_an_outlier_is_not_believed() {
     let sent = flight.sent(true, true, false);
     for for_s in [2, 8] {
         let mut seen = Seen::default();
-        let after = (6 + for_s) * SECOND;
-        let change = |sent: &Sent| {
-            Some(match sent {
-                Sent::Anchor(anchor) if (after..after + SECOND).contains(&anchor.time_ns) => {
-                    let away = flight.frame.position(&anchor.position) + Vector3::new(120.0, -90.0, 0.0);
-                    let position = flight.frame.geodetic(&away);
-                    let world_from_body = rotation(&Vector3::new(0.3, -0.2, 1.0)) * anchor.world_from_body;
-                    Sent::Anchor(PoseAnchor { position, world_from_body, ..*anchor })
-                }
-                sent => *sent,
-            })
-        };
+        let off = [Vector3::new(120.0, -90.0, 0.0), Vector3::new(0.3, -0.2, 1.0)];
+        let change = misplacing(&flight, (6 + for_s) * SECOND, off[0], off[1]);
         seen.fly(&flight, &sent, (6 * SECOND, for_s * SECOND), 45 * SECOND, change);
         assert!(seen.wrong * 20 <= seen.trusted && seen.never.is_empty(), "{for_s}: {seen:?}");
         assert!(seen.longest_s() < 25.0, "{for_s}: {seen:?}");
@@ -169,18 +155,7 @@ fn an_anchor_that_is_turned_is_not_believed_because_a_fix_fits() {
         let flight = Flight::new(32, seed);
         let sent = flight.sent(false, true, true);
         for from_s in [4, 9, 14] {
-            let after = (from_s + 3) * SECOND;
-            let change = |sent: &Sent| {
-                Some(match sent {
-                    Sent::Anchor(anchor) if (after..after + SECOND).contains(&anchor.time_ns) => {
-                        Sent::Anchor(PoseAnchor {
-                            world_from_body: rotation(&turn) * anchor.world_from_body,
-                            ..*anchor
-                        })
-                    }
-                    sent => *sent,
-                })
-            };
+            let change = misplacing(&flight, (from_s + 3) * SECOND, Vector3::zeros(), turn);
             seen.fly(&flight, &sent, (from_s * SECOND, 3 * SECOND), (from_s + 18) * SECOND, change);
         }
     }
@@ -197,7 +172,7 @@ fn what_is_fused_within_an_outage_does_not_hide_it() {
         for (from_s, for_ms) in [(4, 800), (7, 1000), (10, 1100)] {
             let mut seen = Seen::default();
             let outage = (from_s * SECOND, for_ms * SECOND / 1000);
-            seen.fly(&flight, &sent, outage, (from_s + 14) * SECOND, |sent| Some(*sent));
+            seen.fly(&flight, &sent, outage, (from_s + 14) * SECOND, |sent| *sent);
             assert!(seen.is_honest() && seen.never.is_empty() && seen.resets == 0, "{seen:?}");
         }
     }
@@ -216,15 +191,9 @@ fn a_relative_pose_across_the_outage_ends_it() {
         match sent {
             Sent::Imu(_) if (from_ns..to_ns).contains(&now_ns) => continue,
             Sent::Vio(_) if (from_ns..to_ns + FRAME).contains(&now_ns) => continue,
-            Sent::Vio(vio) if now_ns == to_ns + FRAME => {
-                let (from, to) = (Flight::truth(from_ns - FRAME), Flight::truth(now_ns));
-                let back = from.world_from_body.inverse();
-                ignore(estimator.add_vio(VioOutput {
-                    from_ns: from_ns - FRAME,
-                    translation: back * (to.position - from.position),
-                    from_to: back * to.world_from_body,
-                    ..*vio
-                }));
+            Sent::Vio(VioOutput { covariance, .. }) if now_ns == to_ns + FRAME => {
+                let spanning = Flight::relative(from_ns - FRAME, now_ns);
+                ignore(estimator.add_vio(VioOutput { covariance: *covariance, ..spanning }));
             }
             sent => ignore(sent.to(&mut estimator)),
         }
@@ -264,15 +233,12 @@ fn late_fixes_give_the_same_result() {
     let flight = Flight::new(22, 7);
     let sent: Vec<Sent> = flight.sent(true, true, true);
     let sent = sent.iter().filter(|sent| {
-        let (is_silent, has_camera) = (
-            (6 * SECOND..9 * SECOND).contains(&sent.time_ns()),
-            sent.time_ns() < 6 * SECOND || sent.time_ns() > 17 * SECOND,
-        );
+        let time_ns = sent.time_ns();
         match sent {
-            Sent::Imu(_) => !is_silent,
-            Sent::Vio(_) | Sent::Anchor(_) => has_camera,
+            Sent::Imu(_) => !(6 * SECOND..9 * SECOND).contains(&time_ns),
+            Sent::Vio(_) | Sent::Anchor(_) => !(6 * SECOND..=17 * SECOND).contains(&time_ns),
             // Without the IMU, they would be too new for it.
-            _ => !(6 * SECOND..10 * SECOND).contains(&sent.time_ns()),
+            _ => !(6 * SECOND..10 * SECOND).contains(&time_ns),
         }
     });
     let sent: Vec<Sent> = sent.copied().collect();
@@ -281,9 +247,7 @@ fn late_fixes_give_the_same_result() {
             sent.iter().enumerate().map(|(i, sent)| (sent.time_ns() + late_ns(i, sent), sent)).collect();
         arriving.sort_by_key(|(at_ns, _)| *at_ns);
         let mut estimator = started(&flight, StrategyKind::Eskf);
-        for (_, sent) in arriving {
-            ignore(sent.to(&mut estimator));
-        }
+        send(&mut estimator, arriving.into_iter().map(|(_, sent)| sent));
         (estimator.predicted(22 * SECOND), estimator.current_estimate(), estimator.smoothed_history(20))
     };
     let in_time = fly(&|_, _| 0);

@@ -1,41 +1,24 @@
 //! The requirements of recorder and logs.
 
-use super::flight::{FRAME, SECOND};
 use super::*;
-use crate::navigation::Refusal;
-use nalgebra::Vector3;
 use uuid::Uuid;
 
 /// A flight with every kind of fault.
 fn bad_day(strategy: StrategyKind) -> Estimator {
     let flight = Flight::new(30, 4);
     let mut estimator = started(&flight, strategy);
-    for sent in &flight.sent(true, true, true) {
-        let time_ns = sent.time_ns();
-        let second = time_ns / SECOND;
-        let _ = match sent {
-            Sent::Imu(_) if (20..24).contains(&second) => Ok(()),
-            Sent::Vio(_) if (10..14).contains(&second) => Ok(()),
-            Sent::Anchor(anchor) if second == 6 => {
-                let moved = flight.frame.position(&anchor.position) + Vector3::new(90.0, 0.0, 0.0);
-                let outlier = PoseAnchor { position: flight.frame.geodetic(&moved), ..*anchor };
-                estimator.add_pose_anchor(outlier).map(drop)
-            }
-            Sent::Health(reading) if second == 8 => {
-                estimator.add_gps_health(GpsHealthReading { health: GpsHealth::Spoofed, ..*reading }).map(drop)
-            }
-            sent => sent.to(&mut estimator),
-        };
-        estimator.tick(time_ns);
-    }
+    fly(&mut estimator, &flight.sent(true, true, true), |sent| match (sent, sent.time_ns() / SECOND) {
+        (Sent::Imu(_), 20..24) | (Sent::Vio(_), 10..14) => None,
+        (Sent::Anchor(_), 6) => Some(flight.moving(sent, Vector3::x() * 90.0)),
+        (_, 8) => Some(sent.reporting(GpsHealth::Spoofed)),
+        _ => Some(*sent),
+    });
     estimator
 }
 
 #[test]
 fn every_input_is_an_event() {
-    let flight = Flight::new(5, 4);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
+    for (_, flight, mut estimator) in flights(5, 4) {
         for sent in &flight.sent(true, true, true) {
             let before = estimator.sink().len();
             let result = sent.to(&mut estimator);
@@ -49,10 +32,8 @@ fn every_input_is_an_event() {
                     _ => None,
                 })
                 .collect();
-            assert!(
-                reasons.contains(&result.err().map(|error| error.reason())),
-                "{sent:?}, {result:?}: {events:?}"
-            );
+            let is_told = reasons.contains(&result.err().map(|error| error.reason()));
+            assert!(is_told, "{sent:?}, {result:?}: {events:?}");
         }
         let added = |input| {
             let is_it =
@@ -61,7 +42,7 @@ fn every_input_is_an_event() {
         };
         assert_eq!((added(InputKind::Vio), added(InputKind::Anchor), added(InputKind::Imu)), (50, 4, 1000));
         let broken = VioOutput { translation: Vector3::repeat(f64::NAN), ..flight.vio[40] };
-        assert_eq!(estimator.add_vio(broken), Err(EstimatorError::Degraded(Reason::Refused(Refusal::NonFinite))));
+        assert_eq!(estimator.add_vio(broken), degraded(Refusal::NonFinite));
         let expected = EventKind::Degraded { input: InputKind::Vio, reason: Reason::Refused(Refusal::NonFinite) };
         assert_eq!(estimator.sink().last().unwrap().kind, expected);
     }
@@ -82,60 +63,33 @@ fn levels_are_those_of_the_design() {
         };
         for event in estimator.sink() {
             assert_eq!(event.level(), expected(event), "{event:?}");
+            let Some(text) = event.status_text() else { continue };
+            assert!((10..50).contains(&text.as_str().len()) && text.as_str().starts_with("NAV "), "{text}");
         }
-        assert_eq!(estimator.sink().iter().filter(|event| is_blocking(event)).count(), 1, "{}", strategy.name());
-        let seen = |name: &str| count(estimator.sink(), name) > 0;
-        for name in
-            ["ready", "started", "added", "degraded", "rejected", "label", "gate", "keyframe", "fallback_engaged"]
-        {
-            assert!(seen(name), "{}: no {name}", strategy.name());
+        assert_eq!(estimator.sink().iter().filter(|event| is_blocking(event)).count(), 1, "{strategy:?}");
+        let inputs = ["ready", "started", "added", "degraded", "rejected", "label", "gate", "keyframe", "emitted"];
+        let fallback = ["fallback_imminent", "fallback_engaged", "fallback_recovered"];
+        for name in inputs.iter().chain(&fallback) {
+            assert!(count(estimator.sink(), name) > 0, "{strategy:?}: no {name}");
         }
     }
 }
 
+/// [`StatusText`] cuts what is longer.
 #[test]
-fn status_texts_have_at_most_fifty_characters() {
-    let huge = f64::MAX;
-    let rejections = [
-        Rejection::Unhealthy,
-        Rejection::Spoofed,
-        Rejection::Dwelling { seconds: huge },
-        Rejection::AwaitsAnchor,
-        Rejection::TooFar { distance_m: huge },
-        Rejection::Disagrees { distance_m: huge },
-    ];
-    let event = |kind| Event { time_ns: 0, frame_id: Uuid::nil(), spoof_block: false, kind };
-    let texts = rejections.map(|rejection| EventKind::Rejected { rejection }).into_iter().chain([
-        EventKind::CovarianceGrowing { ratio: huge },
-        EventKind::FallbackImminent,
-        EventKind::FallbackEngaged,
-        EventKind::FallbackRecovered,
-        EventKind::Started { from: StartedFrom::FlightController },
-        EventKind::Label { from: SourceLabel::DeadReckoned, to: SourceLabel::SatelliteAnchored },
-        EventKind::Gate { from: GateState::Open, to: GateState::AwaitsAnchor },
-        EventKind::Fatal { input: InputKind::WarmStart, reason: Reason::Overflow },
-    ]);
-    for kind in texts {
-        let text = event(kind).status_text().unwrap();
-        assert!((10..=50).contains(&text.as_str().len()) && text.as_str().starts_with("NAV "), "{text}");
-    }
-    // Texts with typical numbers are not truncated.
-    let usual = EventKind::Rejected { rejection: Rejection::Disagrees { distance_m: 123.4 } };
-    assert_eq!(event(usual).status_text().unwrap().as_str(), "NAV GPS rejected: anchor 123 m off");
-}
-
-/// Keyframes that are still in the window follow, at the end of a flight, those that have left it.
-#[test]
-fn a_recorder_has_every_keyframe_at_the_end() {
-    let flight = Flight::new(6, 3);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
-        flight.sent(true, true, false).iter().for_each(|sent| ignore(sent.to(&mut estimator)));
-        let newest_ns = estimator.current_estimate().unwrap().time_ns;
-        estimator.finish();
-        let times: Vec<i64> = kinds(estimator.sink(), "keyframe").map(|event| event.time_ns).collect();
-        let expected: Vec<i64> = (0..=newest_ns / FRAME).map(|i| i * FRAME).collect();
-        assert_eq!(times, expected, "{}", strategy.name());
+fn status_texts_of_what_rarely_happens() {
+    let rejection = Rejection::Disagrees { distance_m: 123.4 };
+    for (kind, expected) in [
+        (EventKind::Rejected { rejection }, "NAV GPS rejected: anchor 123 m off"),
+        (EventKind::CovarianceGrowing { ratio: 2.5 }, "NAV covariance 2.5 times steady"),
+        (EventKind::FallbackImminent, "NAV no estimate: fallback imminent"),
+        (
+            EventKind::Fatal { input: InputKind::WarmStart, reason: Reason::Overflow },
+            "NAV fatal: no estimate (warm_start)",
+        ),
+    ] {
+        let event = Event { time_ns: 0, frame_id: Uuid::nil(), spoof_block: false, kind };
+        assert_eq!(event.status_text().unwrap().as_str(), expected);
     }
 }
 
@@ -153,13 +107,9 @@ fn a_recorder_has_every_keyframe_before_a_restart() {
         }
         let newest_ns = estimator.current_estimate().unwrap().time_ns;
         estimator.finish();
-        let estimates = kinds(estimator.sink(), "keyframe").map(|event| match event.kind {
-            EventKind::Keyframe { estimate } => estimate,
-            _ => unreachable!(),
-        });
-        let estimates: Vec<_> = estimates.collect();
+        let estimates = keyframes(estimator.sink());
         let times: Vec<i64> = estimates.iter().map(|estimate| estimate.time_ns).collect();
-        let what = std::format!("{}, {behind_ns}: {times:?}", strategy.name());
+        let what = std::format!("{strategy:?}, {behind_ns}: {times:?}");
         let (before, after) = times.split_at(51);
         assert_eq!(before, (0..=50).map(|i| i * FRAME).collect::<Vec<_>>(), "{what}");
         assert!(after.is_sorted_by(|a, b| a < b) && after.len() > 20, "{what}");
@@ -168,48 +118,39 @@ fn a_recorder_has_every_keyframe_before_a_restart() {
     }
 }
 
+/// Those that have left the window, of any size, and at the end of a flight those that are still in it.
 #[test]
-fn keyframes_that_leave_the_window_go_to_the_recorder_once_and_in_order() {
-    let flight = Flight::new(8, 4);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
-        let sent = flight.sent(true, true, false);
-        for sent in &sent {
-            sent.to(&mut estimator).unwrap();
-            if let Sent::Imu(sample) = sent
-                && let Some(output) = estimator.tick(sample.time_ns)
-            {
-                assert!(!output.smoothed, "only the forward estimate leaves");
-            }
-        }
-        let left: Vec<_> = kinds(estimator.sink(), "keyframe")
-            .map(|event| match event.kind {
-                EventKind::Keyframe { estimate } => estimate,
-                _ => unreachable!(),
-            })
-            .collect();
-        let times: Vec<i64> = left.iter().map(|estimate| estimate.time_ns).collect();
-        // From the start to the fifteenth keyframe before the newest.
-        let expected: Vec<i64> = (0..=80 - 15).map(|i| i * FRAME).collect();
-        assert_eq!(times, expected);
-        assert!(left.iter().all(|estimate| estimate.smoothed == strategy.is_smoothing()));
-        assert!(left[20..].iter().all(|estimate| flight.error(estimate).0 < 3.0));
+fn keyframes_go_to_the_recorder_once_and_in_order() {
+    let flight = Flight::new(12, 3);
+    for (strategy, window) in each([2, 6, 15, 40]) {
+        let what = std::format!("{strategy:?}, {window}");
+        let mut estimator = started_with(&flight, strategy, |params| params.window = window);
+        let flown = fly(&mut estimator, &flight.sent(true, true, false), |sent| *sent);
+        let is_smoothed = flown.iter().filter_map(|flown| flown.output).any(|output| output.smoothed);
+        assert!(!is_smoothed && flown.iter().all(|flown| flown.result.is_ok()), "only the forward estimate leaves");
+        let held = estimator.health().keyframes as i64;
+        // The smoother's window restarts when another copy of the filter becomes the best, here last at 10.3 s.
+        assert_eq!(held, i64::from(if strategy.is_smoothing() { window.min(18) } else { window }), "{what}");
+        let times = |of: &[EstimatorOutput]| of.iter().map(|one| one.time_ns).collect::<Vec<_>>();
+        let frames = |range: core::ops::RangeInclusive<i64>| range.map(|i| i * FRAME).collect::<Vec<_>>();
+        let mut history = times(&estimator.smoothed_history(1000));
+        history.reverse();
+        assert_eq!(history, frames(121 - held..=119), "{what}");
+        let left = keyframes(estimator.sink());
+        assert_eq!(times(&left), frames(0..=120 - held), "{what}");
+        assert!(left.iter().all(|estimate| estimate.smoothed == strategy.is_smoothing()), "{what}");
+        assert!(left[20..].iter().all(|estimate| flight.error(estimate).0 < 3.0), "{what}");
+        estimator.finish();
+        assert_eq!(times(&keyframes(estimator.sink())), frames(0..=120), "{what}");
     }
 }
 
 /// Each estimate comes with an event of its id, the inputs since the one before, and the depth of the window.
 #[test]
 fn an_estimate_says_what_was_added() {
-    let flight = Flight::new(8, 4);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
-        let mut ids = Vec::new();
-        for sent in &flight.sent(true, true, false) {
-            sent.to(&mut estimator).unwrap();
-            if let Sent::Imu(sample) = sent {
-                ids.extend(estimator.tick(sample.time_ns).map(|output| output.frame_id));
-            }
-        }
+    for (strategy, flight, mut estimator) in flights(8, 4) {
+        let flown = fly(&mut estimator, &flight.sent(true, true, false), |sent| *sent);
+        let ids: Vec<_> = flown.iter().filter_map(|flown| flown.output).map(|output| output.frame_id).collect();
         let last_ns = kinds(estimator.sink(), "emitted").last().unwrap().time_ns;
         let is_added = |event: &&Event, wanted: InputKind| {
             let EventKind::Added { input, waits, .. } = event.kind else { return false };
@@ -224,7 +165,7 @@ fn an_estimate_says_what_was_added() {
             sums = [sums[0] + imu, sums[1] + vio, sums[2] + poses];
             deepest = deepest.max(smoothed);
         }
-        assert_eq!((sums, deepest), (expected, 15), "{}", strategy.name());
+        assert_eq!((sums, deepest), (expected, 15), "{strategy:?}");
     }
 }
 
@@ -232,10 +173,7 @@ fn an_estimate_says_what_was_added() {
 fn a_recorder_that_is_not_wanted_costs_nothing() {
     let flight = Flight::new(4, 4);
     for strategy in StrategyKind::ALL {
-        let mut config = config(*strategy);
-        config.params.record_keyframes = false;
-        let mut estimator = FlightNavigator::new(config, Events::new()).unwrap();
-        estimator.warm_start(flight.warm_start(0)).unwrap();
+        let mut estimator = started_with(&flight, *strategy, |params| params.record_keyframes = false);
         flight.sent(true, true, false).iter().for_each(|sent| sent.to(&mut estimator).unwrap());
         assert_eq!(count(estimator.sink(), "keyframe"), 0);
         assert_eq!(estimator.current_estimate().unwrap().time_ns, 4 * SECOND);

@@ -1,19 +1,7 @@
 //! A late input may change what earlier ones became. The events say so as they would have at once, and nothing twice.
 
 use super::entry::{Entry, Payload};
-use super::flight::{FRAME, SECOND, STEP};
 use super::*;
-use crate::navigation::geodesy::Geodetic;
-use crate::navigation::{GnssPosition, ImuMean, Refusal};
-use nalgebra::{Matrix6, Vector3};
-
-/// A flight by the IMU alone.
-fn flown(flight: &Flight, strategy: StrategyKind) -> Providing {
-    let mut estimator: Providing = FlightNavigator::new(config(strategy), Events::new()).unwrap();
-    estimator.warm_start(flight.warm_start(0)).unwrap();
-    flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
-    estimator
-}
 
 /// An anchor at the truth, moved by `off` metres along x, with this standard deviation of the position.
 fn anchor(flight: &Flight, time_ns: i64, off: f64, deviation: f64) -> PoseAnchor {
@@ -48,20 +36,23 @@ fn told(events: &[Event], input: InputKind, time_ns: i64) -> Vec<(&'static str, 
     events.iter().filter(of_it).map(|event| (event.kind.name(), event.level(), reason(event))).collect()
 }
 
+/// Checks that an anchor is told to be refused, once.
+fn is_told_to_be_gated(events: &[Event], time_ns: i64) {
+    let told = told(events, InputKind::Anchor, time_ns);
+    let [("degraded", Level::Warn, Some(Reason::Refused(Refusal::Gate { .. })))] = told[..] else {
+        panic!("{told:?}")
+    };
+}
+
 #[test]
 fn an_anchor_that_no_longer_fits_is_degraded_and_warned_of() {
-    let flight = Flight::new(3, 1);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = flown(&flight, *strategy);
+    for (_, flight, mut estimator) in flights_by_imu::<Provided>(3, 1) {
         let wrong_ns = 3 * SECOND - STEP;
         assert!(matches!(estimator.add_pose_anchor(anchor(&flight, wrong_ns, 20.0, 1.5)), Ok(Added::Taken { .. })));
         let before = estimator.sink().len();
         // A precise one, and earlier: with it, the other is far off.
         assert!(estimator.add_pose_anchor(anchor(&flight, wrong_ns - FRAME, 0.0, 0.1)).is_ok());
-        let told_of = told(&estimator.sink()[before..], InputKind::Anchor, wrong_ns);
-        let [("degraded", Level::Warn, Some(Reason::Refused(Refusal::Gate { .. })))] = told_of[..] else {
-            panic!("{}: {told_of:?}", strategy.name())
-        };
+        is_told_to_be_gated(&estimator.sink()[before..], wrong_ns);
         // Run again without a change: nothing is new.
         let before = estimator.sink().len();
         ignore(estimator.add_gps_health(GpsHealthReading { time_ns: wrong_ns - FRAME, health: GpsHealth::NoFix }));
@@ -87,17 +78,14 @@ fn an_anchor_that_does_not_overrule_the_estimate_after_all_says_so() {
             match reason {
                 Reason::Overruled { .. } => overruled_ns = Some(time_ns),
                 Reason::Refused(Refusal::Gate { .. }) => last_ns = time_ns,
-                _ => panic!("{}: {reason:?}", strategy.name()),
+                _ => panic!("{strategy:?}: {reason:?}"),
             }
         }
         let (before, overruled_ns) = (estimator.sink().len(), overruled_ns.unwrap());
         // One that fits the estimate comes late: those before it do not count.
         let late = anchor(&flight, overruled_ns - FRAME / 2, 0.0, 1.0);
-        let added = estimator.add_pose_anchor(PoseAnchor { provider: 1, ..late });
-        let told_of = told(&estimator.sink()[before..], InputKind::Anchor, overruled_ns);
-        let [("degraded", Level::Warn, Some(Reason::Refused(Refusal::Gate { .. })))] = told_of[..] else {
-            panic!("{}: {told_of:?}, {added:?}", strategy.name())
-        };
+        ignore(estimator.add_pose_anchor(PoseAnchor { provider: 1, ..late }));
+        is_told_to_be_gated(&estimator.sink()[before..], overruled_ns);
         assert_eq!(told(&estimator.sink()[before..], InputKind::Anchor, last_ns), [], "still refused");
     }
 }
@@ -115,20 +103,18 @@ fn an_input_that_breaks_the_estimate_after_all_is_fatal() {
         let position_covariance = nalgebra::Matrix3::identity() * 25.0;
         let position = low(start.position, lowered - 6.0);
         estimator.warm_start(FlightControllerState { position, position_covariance, ..start }).unwrap();
-        flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        add_all(&mut estimator, &flight.samples);
         let position = estimator.predicted(late_ns).unwrap().position;
         let (height, place) = (position.height, estimator.frame().unwrap().position(&position));
         let vague = Provided::Place(GnssPosition::new(place, 5.0, 5.0).into());
-        assert!(matches!(estimator.add_factor(late_ns, 0, vague), Ok(Added::Taken { .. })), "{}", strategy.name());
+        assert!(matches!(estimator.add_factor(late_ns, 0, vague), Ok(Added::Taken { .. })), "{strategy:?}");
         assert!(estimator.tick(5 * SECOND).is_some());
         let before = estimator.sink().len();
         let precise = anchor(&flight, early_ns, 0.0, 0.1);
         ignore(estimator.add_pose_anchor(PoseAnchor { position: low(precise.position, lowered), ..precise }));
         let told_of = told(&estimator.sink()[before..], InputKind::Factor, late_ns);
-        let [("fatal", Level::Error, Some(Reason::Refused(refusal)))] = told_of[..] else {
-            panic!("{}: {told_of:?}, from {height} m", strategy.name())
-        };
-        assert!(matches!(refusal, Refusal::OutOfRange), "{refusal:?}");
+        let fatal = ("fatal", Level::Error, Some(Reason::Refused(Refusal::OutOfRange)));
+        assert_eq!(told_of, [fatal], "{strategy:?}, from {height} m");
         assert!(estimator.tick(5 * SECOND + SECOND / 5).is_none(), "none for this tick");
     }
 }
@@ -153,56 +139,32 @@ fn a_frame_is_told_if_it_fails() {
 /// A rejection by another condition is another rejection.
 #[test]
 fn a_fix_that_is_rejected_for_another_reason_says_so() {
-    let flight = Flight::new(4, 1);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = flown(&flight, *strategy);
+    for (strategy, flight, mut estimator) in flights_by_imu::<Provided>(4, 1) {
         let fix = flight.fixes[14];
         let unhealthy = Reason::Gate(Rejection::Unhealthy);
-        assert_eq!(estimator.add_gnss(fix), Err(EstimatorError::Degraded(unhealthy)));
+        assert_eq!(estimator.add_gnss(fix), degraded(unhealthy));
         let spoofed = GpsHealthReading { time_ns: fix.time_ns - STEP, health: GpsHealth::Spoofed };
         estimator.add_gps_health(spoofed).unwrap();
         let expected = [unhealthy, Reason::Gate(Rejection::Spoofed)];
         let told_of = told(estimator.sink(), InputKind::Gnss, fix.time_ns);
-        assert_eq!(told_of, expected.map(|reason| ("rejected", Level::Warn, Some(reason))), "{}", strategy.name());
+        assert_eq!(told_of, expected.map(|reason| ("rejected", Level::Warn, Some(reason))), "{strategy:?}");
     }
 }
 
 /// Warnings that are revised go to the recorder as well.
 #[test]
 fn fixes_that_are_taken_after_all_are_told_once() {
-    let flight = Flight::new(4, 1);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = flown(&flight, *strategy);
+    for (strategy, flight, mut estimator) in flights_by_imu::<Provided>(4, 1) {
         // Fixes first, and only then the health at their times.
         let late = &flight.fixes[14..];
-        let unhealthy = EstimatorError::Degraded(Reason::Gate(Rejection::Unhealthy));
-        late.iter().for_each(|fix| assert_eq!(estimator.add_gnss(*fix), Err(unhealthy)));
+        let unhealthy = Reason::Gate(Rejection::Unhealthy);
+        late.iter().for_each(|fix| assert_eq!(estimator.add_gnss(*fix), degraded(unhealthy)));
         let before = estimator.sink().len();
         flight.health[10..].iter().for_each(|reading| ignore(estimator.add_gps_health(*reading)));
         for fix in late {
             let told_of = told(&estimator.sink()[before..], InputKind::Gnss, fix.time_ns);
-            assert_eq!(told_of, [("revised", Level::Info, None)], "{}", strategy.name());
+            assert_eq!(told_of, [("revised", Level::Info, None)], "{strategy:?}");
         }
-    }
-}
-
-/// However often the time at which it was lost is run again.
-#[test]
-fn an_estimate_that_is_lost_is_told_once() {
-    let flight = Flight::new(3, 1);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = flown(&flight, *strategy);
-        let last = flight.samples[flight.samples.len() - 1];
-        let mut time_ns = last.time_ns;
-        while estimator.health().state != HealthState::Lost {
-            time_ns += STEP;
-            let specific_force = Vector3::new(0.0, 0.0, 900.0);
-            ignore(estimator.add_imu(&ImuMean { time_ns, specific_force, ..last }));
-        }
-        assert_eq!(count(estimator.sink(), "fatal"), 1);
-        let health = GpsHealth::Unstable;
-        estimator.add_gps_health(GpsHealthReading { time_ns: time_ns - FRAME, health }).unwrap();
-        assert_eq!((estimator.counts().reruns, count(estimator.sink(), "fatal")), (1, 1), "{}", strategy.name());
     }
 }
 
@@ -212,17 +174,17 @@ fn each_start_is_told_once() {
     let flight = Flight::new(3, 1);
     for strategy in StrategyKind::ALL {
         let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
-        flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        add_all(&mut estimator, &flight.samples);
         let at = |i: i64| 2 * SECOND + i * FRAME;
         estimator.add_pose_anchor(anchor(&flight, at(0), 0.0, 1.0)).unwrap();
         // The first that agrees with another for as long as the first had been right moves it.
         (1..=4).for_each(|i| ignore(estimator.add_pose_anchor(anchor(&flight, at(i), 4000.0, 1.0))));
-        let started = |estimator: &Providing| {
-            kinds(estimator.sink(), "started").map(|event| event.time_ns).collect::<Vec<_>>()
-        };
-        assert_eq!(started(&estimator), [at(0), at(2)]);
+        assert_eq!(times_of(estimator.sink(), "started"), [at(0), at(2)]);
         let reading = GpsHealthReading { time_ns: at(0) - STEP, health: GpsHealth::Unstable };
         estimator.add_gps_health(reading).unwrap();
-        assert_eq!((estimator.counts().reruns > 0, started(&estimator)), (true, vec![at(0), at(2)]));
+        assert_eq!(
+            (estimator.counts().reruns > 0, times_of(estimator.sink(), "started")),
+            (true, vec![at(0), at(2)])
+        );
     }
 }

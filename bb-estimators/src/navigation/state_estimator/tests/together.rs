@@ -1,7 +1,5 @@
 //! Inputs that arrive together are run together, with the result of one by one.
 
-use super::flight::{SECOND, STEP};
-use super::order::answers;
 use super::*;
 use bb_tests::laws;
 use proptest::prelude::*;
@@ -34,14 +32,12 @@ fn a_call_within_another_is_part_of_it() {
         let (mut estimator, waiting) = after_silence(&flight, *strategy, 380 * STEP);
         let before = estimator.counts().reruns;
         estimator.together(|estimator| {
-            for sent in &waiting {
-                estimator.together(|estimator| ignore(sent.to(estimator)));
-            }
+            waiting.iter().for_each(|sent| estimator.together(|estimator| ignore(sent.to(estimator))));
             assert_eq!(estimator.counts().reruns, before);
         });
         assert!(estimator.counts().reruns <= before + 1);
         let (mut one_by_one, _) = after_silence(&flight, *strategy, 380 * STEP);
-        waiting.iter().for_each(|sent| ignore(sent.to(&mut one_by_one)));
+        send(&mut one_by_one, &waiting);
         assert_eq!(answers(&mut estimator), answers(&mut one_by_one));
     }
 }
@@ -61,15 +57,15 @@ fn a_refused_alarm_shuts_out_what_is_later_than_the_newest_sample() {
             assert!(waiting.len() >= 2, "{}", waiting.len());
             waiting.insert(fixes.min(waiting.len()), alarm);
             match are_together {
-                true => estimator.together(|estimator| waiting.iter().for_each(|sent| ignore(sent.to(estimator)))),
-                false => waiting.iter().for_each(|sent| ignore(sent.to(&mut estimator))),
+                true => estimator.together(|estimator| send(estimator, &waiting)),
+                false => send(&mut estimator, &waiting),
             }
             assert_eq!(count(estimator.sink(), "rejected"), 0, "they were measured before");
             assert_eq!(estimator.health().gate, GateState::Blocked);
             let before = answers(&mut estimator);
             let after = flight.sent(true, true, true).into_iter().filter(|sent| sent.time_ns() > to_ns);
             let after: Vec<Sent> = after.filter(|sent| matches!(sent, Sent::Imu(_) | Sent::Fix(_))).collect();
-            after.iter().for_each(|sent| ignore(sent.to(&mut estimator)));
+            send(&mut estimator, &after);
             let fixes = after.iter().filter(|sent| matches!(sent, Sent::Fix(_))).count();
             assert!(fixes > 1 || silent_steps == 380);
             assert_eq!(count(estimator.sink(), "rejected"), fixes);
@@ -125,12 +121,10 @@ laws! {
                 rest = after;
                 let (samples, others): (Vec<&Sent>, Vec<&Sent>) =
                     chunk.iter().partition(|sent| matches!(sent, Sent::Imu(_)));
-                for sample in samples {
-                    ignore(sample.to(&mut one_by_one));
-                    ignore(sample.to(&mut in_chunks));
-                }
-                others.iter().for_each(|sent| ignore(sent.to(&mut one_by_one)));
-                in_chunks.together(|estimator| others.iter().for_each(|sent| ignore(sent.to(estimator))));
+                send(&mut one_by_one, samples.iter().copied());
+                send(&mut in_chunks, samples);
+                send(&mut one_by_one, others.iter().copied());
+                in_chunks.together(|estimator| send(estimator, others));
                 let health = |estimator: &Estimator| (estimator.health().state, estimator.health().gate, estimator.label());
                 prop_assert_eq!(health(&one_by_one), health(&in_chunks));
                 if rest.is_empty() {
