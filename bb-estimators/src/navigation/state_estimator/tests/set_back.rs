@@ -157,6 +157,19 @@ fn before_the_start_a_clock_that_is_set_back_starts_on_the_new_one() {
     }
 }
 
+#[test]
+fn a_clock_that_is_set_back_does_not_let_a_spoofed_receiver_in() {
+    for (_, flight, mut estimator) in flights(8, 3) {
+        for sent in &flight.sent(true, true, true) {
+            let is_before = sent.time_ns() <= 4 * SECOND;
+            let sent = if is_before { sent.reporting(GpsHealth::Spoofed) } else { sent.behind(3600 * SECOND) };
+            ignore(sent.to(&mut estimator));
+        }
+        assert_eq!(estimator.counts().set_back, 1);
+        assert!(!estimator.health().gate.is_open());
+    }
+}
+
 laws! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
