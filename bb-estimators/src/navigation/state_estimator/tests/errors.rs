@@ -31,6 +31,30 @@ fn degraded_an_outlier_is_refused_and_the_estimate_goes_on() {
     }
 }
 
+#[test]
+fn degraded_positions_that_agree_on_another_place_move_the_estimate() {
+    let off = Vector3::new(80.0, 0.0, 0.0);
+    for (strategy, flight, mut estimator) in flights(12, 2) {
+        let flown = fly(&mut estimator, &flight.sent(true, true, false), |sent| match sent {
+            Sent::Anchor(anchor) if anchor.time_ns > 4 * SECOND => flight.moving(sent, off),
+            _ => *sent,
+        });
+        // The first frame after a jump begins anew.
+        let overruled = flown.iter().filter(|flown| matches!(flown.sent, Sent::Anchor(_))).filter_map(|flown| {
+            let error = flown.result.err()?;
+            assert!(flown.sent.time_ns() > 4 * SECOND && !error.is_fatal(), "{strategy:?}: {error}");
+            let Reason::Overruled { nis } = error.reason() else { return None };
+            assert!(nis > 100.0, "{strategy:?}: {nis}");
+            Some(flown.sent.time_ns() / SECOND)
+        });
+        let overruled: Vec<_> = overruled.collect();
+        // It had been right for 4 s, and then they had agreed for as long; the smoother judges a frame later.
+        assert!(matches!(overruled[..], [8 | 9]), "{strategy:?}: {overruled:?}");
+        let there = estimator.predicted(12 * SECOND).unwrap();
+        assert!((flight.off(&there) - off).norm() < 5.0 && there.resets == 1, "{strategy:?}: {there:?}");
+    }
+}
+
 /// The smoother tells that its iterations have not converged, and follows the filter, which has none.
 #[test]
 fn degraded_a_correction_that_does_not_converge_is_told() {
