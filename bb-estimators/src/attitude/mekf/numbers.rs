@@ -18,8 +18,8 @@ pub(super) const BIAS_DRIFT: f64 = 3e-5;
 
 // How bodies move.
 
-/// Horizontal velocity of any body beyond the velocity it has shown, m/s: a hand.
-pub(super) const VELOCITY_OF_ALL: f64 = 0.3;
+/// Horizontal velocity of any body beyond the velocity and the acceleration it has shown, m/s: a hand that moves slowly.
+pub(super) const VELOCITY_OF_ALL: f64 = 0.15;
 /// Duration of a velocity, s: a step.
 pub(super) const VELOCITY_LASTS_S: f64 = 1.0;
 /// Duration of an acceleration, s, before the opposite one follows.
