@@ -61,7 +61,7 @@ fn started(flight: &Flight, strategy: StrategyKind) -> Estimator {
     started_with(flight, strategy, |_| {})
 }
 
-/// The same with other settings.
+/// An estimator with other settings.
 fn started_with(flight: &Flight, strategy: StrategyKind, set: impl FnOnce(&mut StateEstimatorParams)) -> Estimator {
     let mut config = config(strategy);
     set(&mut config.params);
@@ -94,7 +94,7 @@ fn flights(length_s: i64, seed: u64) -> impl Iterator<Item = (StrategyKind, Flig
     })
 }
 
-/// The same after a flight by the IMU alone.
+/// Estimators of both strategies after a flight by the IMU alone.
 fn flights_by_imu<F: ProvidedFactor>(
     length_s: i64,
     seed: u64,
@@ -129,7 +129,7 @@ fn fly<T: Into<Option<Sent>>>(estimator: &mut Estimator, sent: &[Sent], change: 
 /// Discards the result of inputs, some of which are refused.
 fn ignore<T>(_: Result<T, EstimatorError>) {}
 
-/// What an input becomes that is refused, or that degrades the estimate.
+/// Result of an input that is refused, or that degrades the estimate.
 fn degraded<T>(reason: impl Into<Reason>) -> Result<T, EstimatorError> {
     Err(EstimatorError::Degraded(reason.into()))
 }

@@ -78,10 +78,10 @@ impl Sent {
     }
 }
 
-/// What became of an input.
+/// An input with its result.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Flown {
-    /// Its time before it was changed.
+    /// Time of the input before it was changed.
     pub(super) at_ns: i64,
     pub(super) sent: Sent,
     pub(super) result: Result<(), EstimatorError>,
@@ -282,12 +282,12 @@ impl Flight {
         }
     }
 
-    /// What a position is off by from the truth, m.
+    /// Difference of a position from the truth, m.
     pub(super) fn off(&self, output: &EstimatorOutput) -> Vector3<f64> {
         self.frame.position(&output.position) - Self::truth(output.time_ns).position
     }
 
-    /// What a velocity is off by from the truth, in the axes of the place, m/s.
+    /// Size of the error of a velocity, in the axes of the place, m/s.
     pub(super) fn velocity_error(&self, output: &EstimatorOutput) -> f64 {
         let turn = self.frame.other_from_self(&LocalFrame::new(output.position)).rotation;
         (output.velocity - turn * Self::truth(output.time_ns).velocity).norm()

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What a receiver that is not let in yet was refused for, in the order of [`Scenario::rejected`].
+/// Reasons for which a receiver that is not let in yet was refused, in the order of [`Scenario::rejected`].
 fn cause(event: &Event) -> usize {
     match event.kind {
         EventKind::Rejected { rejection: Rejection::Unhealthy } => 0,

@@ -118,7 +118,7 @@ fn a_recorder_has_every_keyframe_before_a_restart() {
     }
 }
 
-/// Those that have left the window, of any size, and at the end of a flight those that are still in it.
+/// Keyframes that have left the window, of any size, and at the end of a flight those that are still in it.
 #[test]
 fn keyframes_go_to_the_recorder_once_and_in_order() {
     let flight = Flight::new(12, 3);
