@@ -29,7 +29,7 @@ mod propagation;
 mod sample;
 mod start;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod transport;
 
 pub(super) use filter::Doubt;

@@ -13,7 +13,7 @@ use super::refusal::Refusal;
 pub(super) mod past;
 mod ring;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use past::{Key, Past, Run};
 

@@ -54,6 +54,10 @@ fn drone() -> Drone {
     Drone { filter, positions: Stream::new(robust), velocities: Stream::default() }
 }
 
+fn history<const MEASURED: usize>(hold_ns: i64) -> History<Drone, 100, MEASURED, 10> {
+    History::new(drone(), hold_ns).unwrap()
+}
+
 fn sample(i: i64) -> ImuMean {
     let t = i as f64 * 0.01;
     ImuMean {
@@ -72,12 +76,16 @@ fn sensed(kind: bool, value: f64) -> Sensed {
     }
 }
 
-/// Two seconds; each measurement arrives with the sample of its arrival time.
-fn fly(mut arrivals: Vec<(i64, i64, Sensed)>) -> Long {
-    arrivals.sort_by_key(|(arrival, _, _)| *arrival);
-    let mut history = Long::new(drone(), SAMPLE_NS).unwrap();
+/// Flies for some samples; each measurement arrives with the sample of its arrival.
+pub(in crate::navigation) fn replayed<R: Replayed, const S: usize, const M: usize, const K: usize>(
+    mut history: History<R, S, M, K>,
+    samples: i64,
+    sample: fn(i64) -> ImuMean,
+    mut arrivals: Vec<(i64, i64, R::Measurement)>,
+) -> History<R, S, M, K> {
+    arrivals.sort_by_key(|(arrival, ..)| *arrival);
     let mut arrivals = arrivals.into_iter().peekable();
-    for i in 1..=200 {
+    for i in 1..=samples {
         history.propagate(&sample(i)).unwrap();
         while let Some((_, time_ns, measurement)) = arrivals.next_if(|(arrival, ..)| *arrival <= i) {
             match history.update(time_ns, &measurement) {
@@ -87,6 +95,28 @@ fn fly(mut arrivals: Vec<(i64, i64, Sensed)>) -> Long {
         }
     }
     history
+}
+
+/// The filter after a gap between two samples and one sample more. Measurements divide the gap, before it ends or when it is over.
+pub(in crate::navigation) fn over_a_gap<R: Replayed, const S: usize, const M: usize, const K: usize>(
+    mut history: History<R, S, M, K>,
+    (last, next): (i64, i64),
+    sample: fn(i64) -> ImuMean,
+    measured: &[(i64, R::Measurement)],
+    is_late: bool,
+) -> R {
+    (1..=last).for_each(|i| history.propagate(&sample(i)).unwrap());
+    for (i, is_due) in [(next, !is_late), (next + 1, is_late)] {
+        for (time_ns, measurement) in measured.iter().filter(|_| is_due) {
+            history.update(*time_ns, measurement).unwrap();
+        }
+        history.propagate(&sample(i)).unwrap();
+    }
+    history.now().clone()
+}
+
+fn fly(arrivals: Vec<(i64, i64, Sensed)>) -> Long {
+    replayed(history(SAMPLE_NS), 200, sample, arrivals)
 }
 
 laws! {
@@ -100,12 +130,10 @@ laws! {
         // Two measurements with the same stamp are fused in the order of arrival.
         measured.sort_by_key(|(time_ns, ..)| *time_ns);
         measured.dedup_by_key(|(time_ns, ..)| *time_ns);
-        let arrives = |delay: i64, (time_ns, kind, value): (i64, bool, f64)| {
-            (((time_ns + SAMPLE_NS - 1) / SAMPLE_NS + delay).min(200), time_ns, sensed(kind, value))
-        };
         let all = |delayed: i64| -> Vec<_> {
             let one = |(time_ns, delay, kind, value): &(i64, i64, bool, f64)| {
-                arrives(delayed * delay, (*time_ns, *kind, *value))
+                let arrives = (time_ns + SAMPLE_NS - 1) / SAMPLE_NS + delayed * delay;
+                (arrives.min(200), *time_ns, sensed(*kind, *value))
             };
             measured.iter().map(one).collect()
         };
@@ -116,27 +144,8 @@ laws! {
 }
 
 #[test]
-fn at_the_time_of_a_sample_it_is_the_filter_alone() {
-    let mut alone = drone();
-    let mut arrivals = Vec::new();
-    for i in 1..=200 {
-        alone.filter.propagate(&sample(i)).unwrap();
-        if i % 20 == 0 {
-            alone.update(&sensed(i % 40 == 0, 0.1)).unwrap();
-            arrivals.push((200, i * SAMPLE_NS, sensed(i % 40 == 0, 0.1)));
-        }
-    }
-    // If all arrive at the end, the first second is too late.
-    let kept = arrivals.split_off(arrivals.len() / 2 + 1);
-    let in_time = arrivals.into_iter().map(|(_, time_ns, measured)| (time_ns / SAMPLE_NS + 3, time_ns, measured));
-    let history = fly(in_time.chain(kept).collect());
-    assert_eq!(history.now(), &alone);
-    assert!(history.arrivals().longest_delay_ns == 60 * SAMPLE_NS, "{:?}", history.arrivals());
-}
-
-#[test]
 fn what_is_ahead_waits_and_what_is_too_far_away_is_refused() {
-    let mut history = Long::new(drone(), SAMPLE_NS).unwrap();
+    let mut history: Long = history(SAMPLE_NS);
     let measured = sensed(true, 0.1);
     assert_eq!(history.update(SAMPLE_NS / 2, &measured), Ok(Placed::Waits));
     let far = 5 * SAMPLE_NS;
@@ -164,7 +173,7 @@ fn what_is_ahead_waits_and_what_is_too_far_away_is_refused() {
 
 #[test]
 fn more_measurements_than_there_is_room_for_shorten_the_history() {
-    let mut history = History::<Drone, 100, 4, 10>::new(drone(), SAMPLE_NS).unwrap();
+    let mut history = history::<4>(SAMPLE_NS);
     for i in 1..=90 {
         history.propagate(&sample(i)).unwrap();
         history.update(i * SAMPLE_NS, &sensed(false, 0.1)).unwrap();
@@ -180,26 +189,16 @@ fn more_measurements_than_there_is_room_for_shorten_the_history() {
 /// A velocity that says next to nothing, in a gap of 180 ms: both parts are shorter than a sample may be.
 #[test]
 fn a_gap_that_a_measurement_divides_is_a_gap() {
-    let after = |in_gap_ns: Option<i64>, is_late: bool| {
-        let mut history = Long::new(drone(), 20 * SAMPLE_NS).unwrap();
-        (1..=50).for_each(|i| history.propagate(&sample(i)).unwrap());
+    let after = |in_gap_ns: &[i64], is_late: bool| {
         let nothing = Sensed::Velocity(GnssVelocity::new(Vector3::zeros(), 1e6, 1e6));
-        let measure = |history: &mut Long| in_gap_ns.map(|time_ns| history.update(time_ns, &nothing).unwrap());
-        if !is_late {
-            measure(&mut history);
-        }
-        history.propagate(&sample(68)).unwrap();
-        if is_late {
-            measure(&mut history);
-        }
-        history.propagate(&sample(69)).unwrap();
-        history.now().clone()
+        let measured: Vec<_> = in_gap_ns.iter().map(|time_ns| (*time_ns, nothing)).collect();
+        over_a_gap(history::<60>(20 * SAMPLE_NS), (50, 68), sample, &measured, is_late)
     };
-    let whole = after(None, false);
+    let whole = after(&[], false);
     assert_eq!(whole.filter.gaps(), 1);
     for in_gap_ns in [51 * SAMPLE_NS, 59 * SAMPLE_NS, 67 * SAMPLE_NS] {
-        let divided = after(Some(in_gap_ns), false);
-        assert_eq!(divided, after(Some(in_gap_ns), true));
+        let divided = after(&[in_gap_ns], false);
+        assert_eq!(divided, after(&[in_gap_ns], true));
         assert_eq!(divided.filter.gaps(), 2, "each part counts");
         assert_eq!(divided.velocities.counts().fused, 1);
         for i in 3..9 {
@@ -216,7 +215,7 @@ fn a_gap_that_a_measurement_divides_is_a_gap() {
 fn what_makes_room_takes_along_the_states_without_it() {
     let measured = |i: i64| sensed(i % 2 == 0, 0.01 * i as f64);
     let full = |first: i64, late: i64| {
-        let mut history = History::<Drone, 100, 4, 10>::new(drone(), SAMPLE_NS).unwrap();
+        let mut history = history::<4>(SAMPLE_NS);
         let mut alone = drone();
         for i in 1..=35 {
             history.propagate(&sample(i)).unwrap();
@@ -233,7 +232,8 @@ fn what_makes_room_takes_along_the_states_without_it() {
     // There is a state at every tenth sample. The one at sample 20 contains the measurement at its time.
     let (mut history, alone) = full(20, 24);
     history.update(24 * SAMPLE_NS, &measured(24)).unwrap();
-    assert_eq!(history.now(), &alone);
+    assert_eq!(history.now(), &alone, "the filter alone");
+    assert_eq!(history.arrivals().longest_delay_ns, 11 * SAMPLE_NS);
     let (mut history, alone) = full(21, 31);
     let before = history.now().clone();
     let time_ns = 24 * SAMPLE_NS;

@@ -31,11 +31,16 @@ fn estimate() -> impl Strategy<Value = PlanarEstimate> {
     )
 }
 
+fn started_with(params: PlanarParams, start: &PlanarStart) -> PlanarFilter {
+    let mut filter = PlanarFilter::new(params).unwrap();
+    filter.start(start).unwrap();
+    filter
+}
+
 /// A filter at rest at the origin with a moderate uncertainty.
 fn started() -> PlanarFilter {
-    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
-    filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.3, 0.1), (Vector2::zeros(), 0.5))).unwrap();
-    filter
+    let start = PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.3, 0.1), (Vector2::zeros(), 0.5));
+    started_with(PlanarParams::default(), &start)
 }
 
 /// A drive with turns in both directions, sampled at 100 Hz.

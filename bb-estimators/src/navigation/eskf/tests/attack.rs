@@ -5,20 +5,14 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, Translation3, UnitQuaternion, Vector
 use proptest::prelude::*;
 
 use super::super::*;
-use super::{ALL, All, sample, started};
-use crate::navigation::Refusal;
+use super::{ALL, All, Plain, at_rest, open, sample, started, started_with};
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, GnssVelocity, Height, MagneticField, RelativePose,
     WheelSpeed, ZeroVelocity,
 };
-use crate::navigation::state::{NAVIGATION, Navigation, ROTATION, States};
+use crate::navigation::state::{ROTATION, States};
 use crate::navigation::stream::{Stream, StreamParams};
-
-type Plain = EskfFilter<Navigation, NAVIGATION>;
-
-fn open() -> Stream {
-    Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() })
-}
+use crate::navigation::{Estimate, Linearised, Measurement, Refusal};
 
 /// Corrections by whole turns keep the covariance regular, though there the Jacobian of the reset is singular.
 #[test]
@@ -46,11 +40,11 @@ impl Turned {
     const VARIANCE: f64 = 1e-6;
 }
 
-impl crate::navigation::Measurement<3> for Turned {
+impl Measurement<3> for Turned {
     fn linearise<S: States, const N: usize>(
         &self,
-        _: &crate::navigation::Estimate<N>,
-        model: &mut crate::navigation::Linearised<3, N>,
+        _: &Estimate<N>,
+        model: &mut Linearised<3, N>,
     ) -> Result<(), Refusal> {
         model.set_residual(0, &Vector3::new(0.0, 0.0, self.0));
         model.set_noise(0, &(Matrix3::identity() * Self::VARIANCE));
@@ -91,13 +85,13 @@ fn what_is_nowhere_on_the_earth_is_refused() {
     let far = Vector3::new(1e127, 0.0, 0.0);
     assert_eq!(filter.update(&mut stream, &GnssPosition::new(far, 1.0, 1.0)), Err(Refusal::OutOfRange));
     assert_eq!(stream.counts().invalid, 1);
-    let level = UnitQuaternion::identity();
-    let start = |position, velocity| Start::at(0, (position, 1.0), (velocity, 1.0), (level, 0.1));
-    assert_eq!(filter.start(&start(far, Vector3::zeros())), Err(Refusal::OutOfRange));
-    assert_eq!(filter.start(&start(Vector3::zeros(), far)), Err(Refusal::OutOfRange));
-    let spun = Start { gyroscope_bias: far, ..start(Vector3::zeros(), Vector3::zeros()) };
-    assert_eq!(filter.start(&spun), Err(Refusal::OutOfRange));
-    let away = Isometry3::from_parts(Translation3::from(far), level);
+    let start = at_rest(1.0, 1.0, 0.1);
+    for start in
+        [Start { position: far, ..start }, Start { velocity: far, ..start }, Start { gyroscope_bias: far, ..start }]
+    {
+        assert_eq!(filter.start(&start), Err(Refusal::OutOfRange), "{start:?}");
+    }
+    let away = Isometry3::from_parts(Translation3::from(far), UnitQuaternion::identity());
     assert_eq!(filter.move_world(&away), Err(Refusal::OutOfRange));
     let none = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.1, 0.2, 0.0, 0.0));
     let turned = Isometry3::from_parts(Translation3::identity(), none);
@@ -109,9 +103,7 @@ fn what_is_nowhere_on_the_earth_is_refused() {
 #[test]
 fn a_state_without_deviation_keeps_the_covariance_regular() {
     let params = EskfParams { wheel_scale: GaussMarkov::new(0.0, 1e-3), ..EskfParams::default() };
-    let mut filter = EskfFilter::<All, ALL>::new(params).unwrap();
-    let at_rest = Start::at(0, (Vector3::zeros(), 2.0), (Vector3::zeros(), 0.5), (UnitQuaternion::identity(), 0.1));
-    filter.start(&at_rest).unwrap();
+    let mut filter: EskfFilter<All, ALL> = started_with(params, &at_rest(2.0, 0.5, 0.1));
     for i in 1..2000 {
         filter.propagate(&sample(i)).unwrap();
         assert!(filter.is_consistent(), "after {i}");
@@ -134,9 +126,7 @@ fn what_is_measured_exactly_again_and_again_keeps_the_covariance_regular() {
 fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     for (exact, unknown) in [(1e-8, 10.0), (1e-8, 1e3), (1e-7, 1e5), (1e-12, 10.0)] {
         let quiet = EskfParams { accelerometer_noise: 1e-7, gyroscope_noise: 1e-8, ..EskfParams::default() };
-        let mut filter = EskfFilter::<All, ALL>::new(quiet).unwrap();
-        let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
-        filter.start(&Start::at(0, (origin, exact), (origin, unknown), (level, 0.1))).unwrap();
+        let mut filter: EskfFilter<All, ALL> = started_with(quiet, &at_rest(exact, unknown, 0.1));
         filter.set_keyframe(7);
         for i in 1..300 {
             filter.propagate(&sample(i)).unwrap();
@@ -151,11 +141,9 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
 fn a_world_that_tilts_keeps_the_covariance_regular() {
     for tilt in [0.3, 1.0, 2.5] {
         for height in [1e-2, 1e-3, 1e-4, 1e-5] {
-            let mut filter = EskfFilter::<All, ALL>::new(EskfParams::default()).unwrap();
-            let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
             let position_covariance = Matrix3::from_diagonal(&Vector3::new(4e9, 1e9, 6.0));
-            let start = Start::at(0, (origin, 1.0), (origin, 1.0), (level, 0.1));
-            filter.start(&Start { position_covariance, ..start }).unwrap();
+            let start = Start { position_covariance, ..at_rest(1.0, 1.0, 0.1) };
+            let mut filter: EskfFilter<All, ALL> = started_with(EskfParams::default(), &start);
             let mut stream = open();
             filter.update(&mut stream, &BarometricHeight { height: 0.0, deviation: height }).unwrap();
             let axis = nalgebra::Unit::new_normalize(Vector3::new(1.0, 2.0, 0.5));

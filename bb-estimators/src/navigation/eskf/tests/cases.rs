@@ -2,14 +2,11 @@
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::{ALL, All, sample, started};
-use crate::navigation::state::Navigation;
+use super::{ALL, All, Plain, at_rest, bad_samples_are_refused, open, sample, started, started_with};
 use crate::navigation::{
     AbsolutePose, EskfFilter, EskfParams, GnssPosition, GnssVelocity, Height, ImuMean, Refusal, RelativePose,
-    Start, Stream, StreamParams, ZeroVelocity,
+    Stream, StreamParams, ZeroVelocity,
 };
-
-type Plain = EskfFilter<Navigation, 15>;
 
 #[test]
 fn refusals_are_named_and_counted() {
@@ -19,20 +16,12 @@ fn refusals_are_named_and_counted() {
     assert_eq!(filter.update(&mut stream, &fix), Err(Refusal::NotStarted));
     assert_eq!(filter.propagate(&sample(1)), Err(Refusal::NotStarted));
     filter = started();
-    let refused = Refusal::TimeNotIncreasing { previous_ns: 0, time_ns: 0 };
-    assert_eq!(filter.propagate(&sample(0)), Err(refused));
-    let wild = ImuMean { specific_force: Vector3::new(0.0, 1e7, 0.0), ..sample(1) };
-    assert_eq!(filter.propagate(&wild), Err(Refusal::OutOfRange));
-    let nan = ImuMean { angular_velocity: Vector3::new(0.0, f64::NAN, 0.0), ..sample(1) };
-    assert_eq!(filter.propagate(&nan), Err(Refusal::NonFinite));
-    let far = ImuMean { time_ns: i64::MAX, ..sample(1) };
-    assert!(matches!(filter.propagate(&far), Err(Refusal::Gap { .. })));
+    bad_samples_are_refused(0, |sample| filter.propagate(sample));
     let relative = RelativePose::new(3, (Vector3::zeros(), 0.1), (UnitQuaternion::identity(), 0.1));
     assert_eq!(filter.update(&mut stream, &relative), Err(Refusal::NoKeyframe { id: 3 }));
     let nan = GnssPosition::new(Vector3::new(f64::NAN, 0.0, 0.0), 1.0, 1.0);
     assert_eq!(filter.update(&mut stream, &nan), Err(Refusal::NonFinite));
-    let mut negative = fix;
-    negative.covariance = -Matrix3::identity();
+    let negative = GnssPosition { covariance: -Matrix3::identity(), ..fix };
     assert_eq!(filter.update(&mut stream, &negative), Err(Refusal::Noise));
     let outlier = GnssPosition::new(Vector3::new(100.0, 0.0, 0.0), 1.0, 1.0);
     assert!(matches!(filter.update(&mut stream, &outlier), Err(Refusal::Gate { .. })));
@@ -95,7 +84,7 @@ fn absurd_but_finite_samples_leave_finite_numbers() {
     }
     let is_finite = |filter: &Plain| filter.covariance().iter().all(|x| x.is_finite());
     assert!(is_finite(&filter));
-    let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+    let mut stream = open();
     let level = EskfParams::default().gravity;
     for i in 3000..4000 {
         let still = ImuMean {
@@ -132,10 +121,8 @@ fn an_outlier_weighs_less_where_it_is_asked_for() {
 /// Repeated updates that remove nearly all variance; a long flight in the release build, see `docs`.
 #[test]
 fn the_covariance_stays_positive_definite() {
-    let mut filter: EskfFilter<All, ALL> = EskfFilter::new(EskfParams::default()).unwrap();
-    let start = Start::at(0, (Vector3::zeros(), 1e5), (Vector3::zeros(), 1e3), (UnitQuaternion::identity(), 1.0));
-    filter.start(&start).unwrap();
-    let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+    let mut filter: EskfFilter<All, ALL> = started_with(EskfParams::default(), &at_rest(1e5, 1e3, 1.0));
+    let mut stream = open();
     for i in 1..20_000 {
         filter.propagate(&sample(i)).unwrap();
         match i % 5 {

@@ -4,17 +4,16 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::propagation::Transition;
-use super::{All, Drone, Rover, configurations, sample};
+use super::{All, Drone, Rover, Run, are_consistent, open, sample};
 use crate::navigation::math::{exp, rotation, sqrt};
 use crate::navigation::noise::Noise;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, offset};
 use crate::navigation::{
     BarometricHeight, EskfFilter, EskfParams, GaussMarkov, GnssHeading, GnssPosition, GnssVelocity, ImuMean,
-    MagneticField, Measurement, RelativePose, Start, Stream, StreamParams, WheelSpeed, nees,
+    MagneticField, RelativePose, Start, WheelSpeed, nees,
 };
 
 const DT: f64 = 0.01;
-const FLIGHTS: u32 = 100;
 
 /// The sensors, named after their streams.
 const SENSORS: [&str; 7] =
@@ -22,14 +21,6 @@ const SENSORS: [&str; 7] =
 
 /// Magnetic field of the Earth, in the world.
 const FIELD: Vector3<f64> = Vector3::new(1e-6, 20e-6, -44e-6);
-
-/// The result of a 30 s flight: the normalised error of all states except the keyframe, the number of these states, and the
-/// sensors' streams.
-struct Flown {
-    nees: f64,
-    dimension: usize,
-    streams: [Stream; SENSORS.len()],
-}
 
 fn params() -> EskfParams {
     EskfParams {
@@ -95,7 +86,8 @@ impl Hidden {
     }
 }
 
-fn fly<S: States, const N: usize>(seed: u64) -> Flown {
+/// A flight of 30 s. The keyframe has no error of its own.
+fn fly<S: States, const N: usize>(seed: u64) -> Run {
     let params = params();
     let mut noise = Noise::new(seed);
     let mut filter = EskfFilter::<S, N>::new(params).unwrap();
@@ -118,7 +110,7 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
     let hidden = hidden::<S>();
     hidden.iter().for_each(|state| state.draw(&mut truth, &mut noise));
     let mut keyframe = truth;
-    let mut streams = [Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }); SENSORS.len()];
+    let mut streams = [open(); SENSORS.len()];
     for i in 1..=3000_i64 {
         let ImuMean { time_ns, angular_velocity, specific_force } = sample(i);
         (truth.angular_velocity, truth.specific_force) = (angular_velocity, specific_force);
@@ -141,7 +133,7 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
             let way = back * (truth.position - keyframe.position) * scale + noise.vector(0.05);
             let turn = back * truth.world_from_body * rotation(&noise.vector(2e-3));
             let id = u64::try_from(i / 20 - 1).unwrap();
-            fuse(&mut filter, relative, &RelativePose::new(id, (way, 0.05), (turn, 2e-3)));
+            filter.update(relative, &RelativePose::new(id, (way, 0.05), (turn, 2e-3))).unwrap();
             filter.set_keyframe(id + 1);
             keyframe = truth;
         }
@@ -151,17 +143,17 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
                 let along =
                     (truth.world_from_body.inverse() * truth.velocity + angular_velocity.cross(&lever_arm)).x;
                 let speed = (1.0 + truth.scalar::<S>(Optional::WheelScale)) * along + 0.1 * noise.next();
-                fuse(&mut filter, wheels, &WheelSpeed { speed, deviation: 0.1, forward, lever_arm });
+                filter.update(wheels, &WheelSpeed { speed, deviation: 0.1, forward, lever_arm }).unwrap();
             }
             if offset::<S>(Optional::HardIron).is_some() {
                 let iron = truth.vector::<S>(Optional::HardIron);
                 let field = truth.world_from_body.inverse() * FIELD + iron + noise.vector(1e-6);
-                fuse(&mut filter, magnetic, &MagneticField { field, reference: FIELD, deviation: 1e-6 });
+                filter.update(magnetic, &MagneticField { field, reference: FIELD, deviation: 1e-6 }).unwrap();
             }
             if offset::<S>(Optional::BarometerBias).is_some() {
                 let bias = truth.scalar::<S>(Optional::BarometerBias);
                 let height = truth.position.z + bias + 0.5 * noise.next();
-                fuse(&mut filter, pressure, &BarometricHeight { height, deviation: 0.5 });
+                filter.update(pressure, &BarometricHeight { height, deviation: 0.5 }).unwrap();
             }
         }
         if i % 50 == 0 {
@@ -173,13 +165,13 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
                 + truth.world_from_body * angular_velocity.cross(&angular_velocity.cross(&lever_arm));
             let moving = truth.velocity + swing - acceleration * (0.5 * delay);
             let antenna = truth.position + truth.world_from_body * lever_arm - moving * delay;
-            fuse(&mut filter, positions, &GnssPosition::new(antenna + noise.vector(0.8), 0.8, 0.8));
+            filter.update(positions, &GnssPosition::new(antenna + noise.vector(0.8), 0.8, 0.8)).unwrap();
             let moving = truth.velocity + swing - acceleration * delay;
-            fuse(&mut filter, velocities, &GnssVelocity::new(moving + noise.vector(0.1), 0.1, 0.1));
+            filter.update(velocities, &GnssVelocity::new(moving + noise.vector(0.1), 0.1, 0.1)).unwrap();
             let baseline = Vector3::x();
             let ahead = truth.world_from_body * rotation(&(angular_velocity * -delay)) * baseline;
             let heading = ahead.y.atan2(ahead.x) + 0.02 * noise.next();
-            fuse(&mut filter, headings, &GnssHeading { heading, deviation: 0.02, baseline });
+            filter.update(headings, &GnssHeading { heading, deviation: 0.02, baseline }).unwrap();
         }
     }
     (truth.gyroscope_bias, truth.accelerometer_bias) = (gyroscope_bias, accelerometer_bias);
@@ -195,46 +187,7 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
     }
     let dimension = (0..N).filter(|i| is_counted(*i)).count();
     let nees = nees(&error, &covariance).unwrap();
-    Flown { nees, dimension, streams }
-}
-
-fn fuse<S: States, const N: usize, X: Measurement<D>, const D: usize>(
-    filter: &mut EskfFilter<S, N>,
-    stream: &mut Stream,
-    measurement: &X,
-) {
-    filter.update(stream, measurement).unwrap();
-}
-
-fn errors_are_as_large_as_the_filter_says<S: States, const N: usize>(sensors: usize) {
-    let flights: Vec<_> = (0..FLIGHTS).map(|seed| fly::<S, N>(u64::from(seed) + 1)).collect();
-    let mean = flights.iter().map(|flown| flown.nees).sum::<f64>() / f64::from(FLIGHTS);
-    // Three standard deviations of a mean of χ² with the same number of dimensions.
-    let dimension = flights[0].dimension as f64;
-    let spread = 3.0 * (2.0 * dimension / f64::from(FLIGHTS)).sqrt();
-    assert!((mean - dimension).abs() < spread, "NEES {mean}, not {dimension} ± {spread}");
-    let mut used = 0;
-    for (i, name) in SENSORS.into_iter().enumerate() {
-        let consistency = |flown: &Flown| *flown.streams[i].consistency();
-        if consistency(&flights[0]).count() == 0 {
-            continue;
-        }
-        used += 1;
-        let over = |of: &dyn Fn(&Flown) -> f64| flights.iter().map(of).sum::<f64>() / f64::from(FLIGHTS);
-        let nis = over(&|flown| consistency(flown).mean_nis().unwrap());
-        let correlation = over(&|flown| consistency(flown).correlation().unwrap());
-        // Four standard deviations of a mean of χ², and of a correlation, over the same number of innovations.
-        let innovations = consistency(&flights[0]).count() as f64 * f64::from(FLIGHTS);
-        let of_one = consistency(&flights[0]).nis_bounds().1 - 1.0;
-        let spread = 4.0 * of_one / 1.96 / f64::from(FLIGHTS).sqrt();
-        assert!((nis - 1.0).abs() < spread, "{name}: NIS {nis}, not 1 ± {spread}");
-        let spread = 4.0 / innovations.sqrt();
-        assert!(
-            correlation.abs() < spread,
-            "{name}: {correlation} from one innovation to the next, not 0 ± {spread}"
-        );
-    }
-    assert_eq!(used, sensors);
+    Run { nees, dimension, streams: streams.to_vec() }
 }
 
 /// The number of sensors in a configuration: the common ones and those of its optional states.
@@ -243,17 +196,14 @@ fn sensors<S: States>() -> usize {
     3 + of_states.into_iter().filter(|state| offset::<S>(*state).is_some()).count()
 }
 
-macro_rules! consistent {
-    ($($name:ident: $states:ty;)*) => { $(
-        mod $name {
-            use super::*;
-
-            #[test]
-            fn errors_are_as_large_as_the_filter_says() {
-                super::errors_are_as_large_as_the_filter_says::<$states, { <$states>::DIMENSION }>(sensors::<$states>());
-            }
+macro_rules! errors_are_as_large_as_the_filter_says {
+    ($($name:ident: $states:ty),*) => { $(
+        #[test]
+        fn $name() {
+            let flights: Vec<_> = (1..=100).map(fly::<$states, { <$states>::DIMENSION }>).collect();
+            assert_eq!(are_consistent(&flights, &SENSORS, 4.0), sensors::<$states>());
         }
     )* };
 }
 
-configurations!(consistent);
+errors_are_as_large_as_the_filter_says!(plain: Navigation, rover: Rover, drone: Drone, all: All);

@@ -1,12 +1,11 @@
 //! Jacobians of every measurement: the residual of an exact measurement is zero, and the Jacobian matches numeric differentiation.
 
 use bb_tests::laws;
-use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::super::transport::Transport;
-use super::{ALL, All, estimate, orientation, vector};
-use crate::navigation::covariance::Covariance;
+use super::super::EskfFilter;
+use super::{ALL, All, estimate, is_transported, orientation, vector};
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, Linearised,
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
@@ -26,9 +25,8 @@ fn check<const D: usize>(measurement: &impl Measurement<D>, truth: &Estimate<ALL
     for state in 0..ALL {
         let step = 1e-6;
         let [above, below] = [step, -step].map(|step| {
-            let mut error = SVector::zeros();
-            error[state] = step;
-            at(&truth.corrected::<All>(&error)).map(|model| SVector::<f64, D>::from(model.residual))
+            at(&truth.corrected::<All>(&SVector::ith(state, step)))
+                .map(|model| SVector::<f64, D>::from(model.residual))
         });
         let (Ok(above), Ok(below)) = (above, below) else { continue };
         // The residual is measured minus predicted, so it falls as the estimate grows.
@@ -45,40 +43,17 @@ fn antenna_velocity(at: &Estimate<ALL>, lever_arm: Vector3<f64>) -> Vector3<f64>
 }
 
 laws! {
-    /// T, which takes a change of an error to errors of the state that is composed with it.
     #[test]
     fn of_the_composition(
-        at in estimate(), error in proptest::collection::vec(-1.0..1.0, ALL),
-        numbers in proptest::collection::vec(-1.0..1.0, ALL * ALL),
+        mut at in estimate(), error in proptest::collection::vec(-1.0..1.0, ALL),
+        root in proptest::collection::vec(-1.0..1.0, ALL * ALL),
     ) {
         let delay = offset::<All>(Optional::GnssDelay).unwrap();
-        let mut at = at;
         at.optional[delay] = 0.1;
         let mut error = SVector::<f64, ALL>::from_column_slice(&error);
         // Within the largest delay.
         error[delay] *= 0.3;
-        let composed = at.composed::<All>(&error);
-        let numeric = SMatrix::<f64, ALL, ALL>::from_columns(&core::array::from_fn::<_, ALL, _>(|state| {
-            let moved = |step: f64| {
-                let mut error = error;
-                error[state] += step;
-                composed.error_to::<All>(&at.composed::<All>(&error))
-            };
-            (moved(1e-6) - moved(-1e-6)) / 2e-6
-        }));
-        let mut rows: [[f64; ALL]; ALL] = core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j))));
-        let transport = Transport::new::<All, ALL>(&error);
-        transport.of_jacobian(&mut rows);
-        let exact = SMatrix::<f64, ALL, ALL>::from_fn(|i, j| rows[i][j]);
-        prop_assert!((numeric - exact).amax() < 1e-7, "{} is not {}", exact, numeric);
-        let root = SMatrix::<f64, ALL, ALL>::from_iterator(numbers);
-        let dense = root * root.transpose();
-        let mut covariance = Covariance::<ALL>::new();
-        *covariance.rows_mut() = core::array::from_fn(|i| core::array::from_fn(|j| dense[(i, j)]));
-        transport.of_covariance(&mut covariance);
-        let expected = exact * dense * exact.transpose();
-        prop_assert!((covariance.matrix() - expected).amax() < 1e-12 * (1.0 + expected.amax()));
-        prop_assert_eq!(covariance.matrix(), &covariance.matrix().transpose());
+        is_transported::<EskfFilter<All, ALL>, ALL>((&at, &error), root, Estimate::error_to::<All>)?;
     }
 
     #[test]

@@ -5,13 +5,13 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-use super::{All, Drone, Estimate, Rover, configurations, estimate, orientation, sample, started, vector};
+use super::{All, Drone, Estimate, Rover, estimate, open, orientation, sample, started, vector};
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset,
 };
 use crate::navigation::{
     AbsolutePose, BarometricHeight, EskfFilter, EskfParams, GnssPosition, GnssVelocity, ImuMean, MagneticField,
-    Refusal, RelativePose, Start, Stream, StreamParams, WheelSpeed,
+    Refusal, RelativePose, Start, Stream, WheelSpeed,
 };
 
 type Law = Result<(), TestCaseError>;
@@ -32,7 +32,7 @@ fn flight<S: States, const N: usize>(
         .start(&Start::at(0, (to_world(Vector3::zeros()), 2.0), (velocity, 0.5), (orientation(level), 0.1)))
         .unwrap();
     filter.set_keyframe(0);
-    let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+    let mut stream = open();
     for i in 1..=200 {
         let in_body = |v: Vector3<f64>| mounting.inverse() * v;
         let ImuMean { time_ns, angular_velocity, specific_force } = sample(i);
@@ -71,7 +71,7 @@ fn flight<S: States, const N: usize>(
     filter
 }
 
-fn flight_plain<S: States, const N: usize>() -> EskfFilter<S, N> {
+pub(super) fn flight_plain<S: States, const N: usize>() -> EskfFilter<S, N> {
     flight(UnitQuaternion::identity(), Vector3::zeros(), UnitQuaternion::identity())
 }
 
@@ -87,7 +87,7 @@ fn the_world_does_not_matter<S: States, const N: usize>(heading: f64, shift: Vec
 }
 
 /// A filter that is moved to another world equals one that was in that world from the start.
-fn a_filter_moves_to_another_world<S: States, const N: usize>(heading: f64, shift: Vector3<f64>) -> Law {
+fn it_moves_to_another_world<S: States, const N: usize>(heading: f64, shift: Vector3<f64>) -> Law {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
     let mut moved = flight_plain::<S, N>();
     moved.move_world(&Isometry3::from_parts(Translation3::from(shift), turn)).unwrap();
@@ -104,7 +104,7 @@ fn a_filter_moves_to_another_world<S: States, const N: usize>(heading: f64, shif
     Ok(())
 }
 
-fn the_sensors_mounting_does_not_matter<S: States, const N: usize>(mounting: UnitQuaternion<f64>) -> Law {
+fn the_mounting_does_not_matter<S: States, const N: usize>(mounting: UnitQuaternion<f64>) -> Law {
     let (plain, turned) =
         (flight_plain::<S, N>(), flight::<S, N>(UnitQuaternion::identity(), Vector3::zeros(), mounting));
     let rotation = mounting.inverse().to_rotation_matrix().into_inner();
@@ -124,7 +124,7 @@ fn the_sensors_mounting_does_not_matter<S: States, const N: usize>(mounting: Uni
     Ok(())
 }
 
-fn what_is_refused_changes_nothing<S: States, const N: usize>(numbers: &[f64], time_ns: i64) -> Law {
+fn refusals_change_nothing<S: States, const N: usize>(numbers: &[f64], time_ns: i64) -> Law {
     let mut filter: EskfFilter<S, N> = started();
     for i in 1..20 {
         filter.propagate(&sample(i)).unwrap();
@@ -151,44 +151,46 @@ fn what_is_refused_changes_nothing<S: States, const N: usize>(numbers: &[f64], t
     Ok(())
 }
 
-/// The laws of one configuration.
-macro_rules! laws_of {
-    ($($name:ident: $states:ty;)*) => { $(
-        mod $name {
-            use super::*;
-            const N: usize = <$states>::DIMENSION;
-
-            laws! {
-                #![proptest_config(ProptestConfig::with_cases(16))]
-
-                #[test]
-                fn the_worlds_heading_and_origin_do_not_matter(heading in -3.0..3.0, shift in vector(1000.0)) {
-                    the_world_does_not_matter::<$states, N>(heading, shift)?;
-                }
-
-                #[test]
-                fn a_filter_moves_to_another_world(heading in -3.0..3.0, shift in vector(1000.0)) {
-                    super::a_filter_moves_to_another_world::<$states, N>(heading, shift)?;
-                }
-
-                #[test]
-                fn the_sensors_mounting_does_not_matter(mounting in orientation()) {
-                    super::the_sensors_mounting_does_not_matter::<$states, N>(mounting)?;
-                }
-
-                #[test]
-                fn what_is_refused_changes_nothing(
-                    numbers in proptest::collection::vec(prop_oneof![any::<f64>(), -10.0..10.0, Just(f64::NAN)], 12),
-                    time_ns in any::<i64>(),
-                ) {
-                    super::what_is_refused_changes_nothing::<$states, N>(&numbers, time_ns)?;
-                }
-            }
-        }
-    )* };
+/// Checks a law for every configuration.
+macro_rules! every {
+    ($law:ident($($argument:expr),*)) => {
+        every!($law($($argument),*): Navigation, Rover, Drone, All)
+    };
+    ($law:ident $arguments:tt: $($states:ty),*) => { $(
+        every!(@ $law, $arguments, $states)
+    );* };
+    (@ $law:ident, ($($argument:expr),*), $states:ty) => {
+        $law::<$states, { <$states>::DIMENSION }>($($argument),*)
+            .map_err(|error| TestCaseError::fail(format!("{}: {error}", stringify!($states))))?
+    };
 }
 
-configurations!(laws_of);
+laws! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn the_worlds_heading_and_origin_do_not_matter(heading in -3.0..3.0, shift in vector(1000.0)) {
+        every!(the_world_does_not_matter(heading, shift));
+    }
+
+    #[test]
+    fn a_filter_moves_to_another_world(heading in -3.0..3.0, shift in vector(1000.0)) {
+        every!(it_moves_to_another_world(heading, shift));
+    }
+
+    #[test]
+    fn the_sensors_mounting_does_not_matter(mounting in orientation()) {
+        every!(the_mounting_does_not_matter(mounting));
+    }
+
+    #[test]
+    fn what_is_refused_changes_nothing(
+        numbers in proptest::collection::vec(prop_oneof![any::<f64>(), -10.0..10.0, Just(f64::NAN)], 12),
+        time_ns in any::<i64>(),
+    ) {
+        every!(refusals_change_nothing(&numbers, time_ns));
+    }
+}
 
 laws! {
     #![proptest_config(ProptestConfig::with_cases(24))]

@@ -3,10 +3,11 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::super::{
-    GYROSCOPE_BIAS, PlanarFilter, PlanarParams, PlanarPosition, PlanarStart, WHEEL_SCALE, WheelVelocity, YawRate,
+    GYROSCOPE_BIAS, PlanarFilter, PlanarParams, PlanarPosition, PlanarStart, WHEEL_SCALE, WheelVelocity,
 };
-use super::{sample, started};
+use super::{sample, started, started_with};
 use crate::navigation::eskf::GaussMarkov;
+use crate::navigation::eskf::tests::bad_samples_are_refused;
 use crate::navigation::{ImuMean, Refusal, Stream};
 
 #[test]
@@ -21,14 +22,7 @@ fn refusals_are_named_and_counted() {
     let unknown = PlanarStart { position_covariance: Matrix2::new(1.0, 2.0, 2.0, 1.0), ..nowhere };
     assert_eq!(filter.start(&PlanarStart { position: Vector2::zeros(), ..unknown }), Err(Refusal::Noise));
     filter = started();
-    let refused = Refusal::TimeNotIncreasing { previous_ns: 0, time_ns: 0 };
-    assert_eq!(filter.propagate(&sample(0)), Err(refused));
-    let wild = ImuMean { angular_velocity: Vector3::new(0.0, 0.0, 1e7), ..sample(1) };
-    assert_eq!(filter.propagate(&wild), Err(Refusal::OutOfRange));
-    let nan = ImuMean { angular_velocity: Vector3::new(0.0, 0.0, f64::NAN), ..sample(1) };
-    assert_eq!(filter.propagate(&nan), Err(Refusal::NonFinite));
-    let far = ImuMean { time_ns: i64::MAX, ..sample(1) };
-    assert!(matches!(filter.propagate(&far), Err(Refusal::Gap { .. })));
+    bad_samples_are_refused(0, |sample| filter.propagate(sample));
     let nan = PlanarPosition::new(Vector2::new(f64::NAN, 0.0), 1.0);
     assert_eq!(filter.update(&mut stream, &nan), Err(Refusal::NonFinite));
     let negative = PlanarPosition { covariance: -Matrix2::identity(), ..fix };
@@ -62,9 +56,8 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
             gyroscope_noise: 1e-8,
             ..PlanarParams::default()
         };
-        let mut filter = PlanarFilter::new(quiet).unwrap();
         let start = PlanarStart::at(0, (Vector2::zeros(), exact), (0.3, 1e-6), (Vector2::zeros(), unknown));
-        filter.start(&start).unwrap();
+        let mut filter = started_with(quiet, &start);
         for i in 1..300 {
             filter.propagate(&sample(i)).unwrap();
             assert!(filter.is_consistent(), "{exact} {unknown}: after {i}");
@@ -77,8 +70,8 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
 fn the_bias_and_the_wheels_scale_are_found() {
     const BIAS: f64 = 0.01;
     const SCALE: f64 = 0.03;
-    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
-    filter.start(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.05), (Vector2::zeros(), 0.1))).unwrap();
+    let start = PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.05), (Vector2::zeros(), 0.1));
+    let mut filter = started_with(PlanarParams::default(), &start);
     let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
     // On a circle of 20 m at 2 m/s.
     let (speed, rate) = (2.0, 0.1);
@@ -106,8 +99,8 @@ fn the_bias_and_the_wheels_scale_are_found() {
 #[test]
 fn a_scale_that_is_known_stays_what_it_is() {
     let params = PlanarParams { wheel_scale: GaussMarkov::new(0.0, 1000.0), ..PlanarParams::default() };
-    let mut filter = PlanarFilter::new(params).unwrap();
-    filter.start(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.05), (Vector2::new(1.1, 0.0), 0.1))).unwrap();
+    let start = PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.05), (Vector2::new(1.1, 0.0), 0.1));
+    let mut filter = started_with(params, &start);
     let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
     for i in 1..=2000_i64 {
         filter.propagate(&ImuMean { angular_velocity: Vector3::zeros(), ..sample(i) }).unwrap();
@@ -115,18 +108,6 @@ fn a_scale_that_is_known_stays_what_it_is() {
         let _ = filter.update(&mut gnss, &PlanarPosition::new(Vector2::new(0.01 * i as f64, 0.0), 0.5));
     }
     assert!(filter.estimate().unwrap().wheel_scale.abs() < 1e-9 && filter.is_consistent());
-}
-
-#[test]
-fn wheels_at_rest_show_the_bias() {
-    let mut filter = started();
-    let mut stream = Stream::default();
-    for i in 1..=1000 {
-        let angular_velocity = Vector3::new(0.0, 0.0, 0.008);
-        filter.propagate(&ImuMean { angular_velocity, ..sample(i) }).unwrap();
-        filter.update(&mut stream, &YawRate { rate: 0.0, deviation: 0.02 }).unwrap();
-    }
-    assert!((filter.estimate().unwrap().gyroscope_bias - 0.008).abs() < 1e-3);
 }
 
 #[test]

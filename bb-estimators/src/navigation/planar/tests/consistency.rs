@@ -4,25 +4,20 @@ use nalgebra::{SVector, Vector2, Vector3};
 
 use super::super::propagation::Transition;
 use super::super::{
-    PlanarEstimate, PlanarFilter, PlanarHeading, PlanarParams, PlanarPosition, PlanarStart, STATES, WheelVelocity,
-    YawRate,
+    PlanarEstimate, PlanarHeading, PlanarParams, PlanarPosition, PlanarStart, STATES, WheelVelocity, YawRate,
 };
-use super::sample;
+use super::{sample, started_with};
 use crate::navigation::eskf::GaussMarkov;
+use crate::navigation::eskf::tests::{Run, are_consistent, open};
 use crate::navigation::math::sqrt;
 use crate::navigation::noise::Noise;
-use crate::navigation::{ImuMean, Stream, StreamParams, nees};
+use crate::navigation::{ImuMean, nees};
 
 const DT: f64 = 0.01;
 const ANTENNA: Vector2<f64> = Vector2::new(-0.5, 0.3);
 
-/// The result of a 40 s drive: the normalised error of all states, and the sensors' streams.
-struct Driven {
-    nees: f64,
-    streams: [Stream; 4],
-}
-
-fn drive(seed: u64) -> Driven {
+/// A drive of 40 s.
+fn drive(seed: u64) -> Run {
     let params = PlanarParams {
         gyroscope_noise: 1e-3,
         gyroscope_bias_walk: 1e-4,
@@ -32,9 +27,9 @@ fn drive(seed: u64) -> Driven {
         ..PlanarParams::default()
     };
     let mut noise = Noise::new(seed);
-    let mut filter = PlanarFilter::new(params).unwrap();
     let velocity = Vector2::new(3.0, 0.0);
-    filter.start(&PlanarStart::at(0, (Vector2::zeros(), 1.0), (1.0, 0.05), (velocity, 0.3))).unwrap();
+    let start = PlanarStart::at(0, (Vector2::zeros(), 1.0), (1.0, 0.05), (velocity, 0.3));
+    let mut filter = started_with(params, &start);
     // The truth deviates from the estimate according to the filter's initial covariance.
     let mut truth: PlanarEstimate = *filter.estimate().unwrap();
     let pair = |noise: &mut Noise, deviation: f64| Vector2::new(noise.next(), noise.next()) * deviation;
@@ -43,7 +38,7 @@ fn drive(seed: u64) -> Driven {
     truth.velocity += pair(&mut noise, 0.3);
     truth.wheel_scale = 0.03 * noise.next();
     truth.gyroscope_bias = 0.02 * noise.next();
-    let mut streams = [Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }); 4];
+    let mut streams = [open(); 4];
     for i in 1..=4000_i64 {
         let rate = sample(i).angular_velocity.z;
         truth.yaw_rate = rate;
@@ -73,23 +68,11 @@ fn drive(seed: u64) -> Driven {
         }
     }
     let error: SVector<f64, STATES> = filter.estimate().unwrap().error_to(&truth);
-    Driven { nees: nees(&error, filter.covariance()).unwrap(), streams }
+    Run { nees: nees(&error, filter.covariance()).unwrap(), dimension: STATES, streams: streams.to_vec() }
 }
 
 #[test]
 fn errors_are_as_large_as_the_filter_says() {
-    const DRIVES: u32 = 200;
-    let drives: Vec<_> = (0..DRIVES).map(|seed| drive(u64::from(seed) + 1)).collect();
-    let mean = drives.iter().map(|driven| driven.nees).sum::<f64>() / f64::from(DRIVES);
-    // Three standard deviations of a mean of χ² with the same number of dimensions.
-    let dimension = STATES as f64;
-    let spread = 3.0 * (2.0 * dimension / f64::from(DRIVES)).sqrt();
-    assert!((mean - dimension).abs() < spread, "NEES {mean}, not {dimension} ± {spread}");
-    for (i, name) in ["wheels", "yaw rates", "positions", "headings"].into_iter().enumerate() {
-        let over = |of: &dyn Fn(&Driven) -> f64| drives.iter().map(of).sum::<f64>() / f64::from(DRIVES);
-        let nis = over(&|driven| driven.streams[i].consistency().mean_nis().unwrap());
-        let correlation = over(&|driven| driven.streams[i].consistency().correlation().unwrap());
-        assert!((nis - 1.0).abs() < 0.04, "{name}: NIS {nis}");
-        assert!(correlation.abs() < 0.05, "{name}: {correlation} from one innovation to the next");
-    }
+    let drives: Vec<_> = (1..=200).map(drive).collect();
+    assert_eq!(are_consistent(&drives, &["wheels", "yaw rates", "positions", "headings"], 3.5), 4);
 }

@@ -1,7 +1,7 @@
 //! Analytic derivatives compared with finite differences.
 
 use bb_tests::laws;
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -14,26 +14,9 @@ use super::super::{
 use super::{estimate, vector};
 use crate::navigation::Linearised;
 use crate::navigation::covariance::Covariance;
-use crate::navigation::update::Composed;
+use crate::navigation::eskf::tests::{covariance, derivative, is_transported, matrix};
 
 const STEP: f64 = 1e-5;
-
-/// The derivative of `of` with respect to each error, by central differences.
-fn derivative<const D: usize>(
-    at: &PlanarEstimate,
-    of: impl Fn(&PlanarEstimate) -> SVector<f64, D>,
-) -> SMatrix<f64, D, STATES> {
-    let mut derivative = SMatrix::<f64, D, STATES>::zeros();
-    for state in 0..STATES {
-        let moved = |step: f64| {
-            let mut error = SVector::<f64, STATES>::zeros();
-            error[state] = step;
-            of(&at.corrected(&error))
-        };
-        derivative.set_column(state, &((moved(STEP) - moved(-STEP)) / (2.0 * STEP)));
-    }
-    derivative
-}
 
 /// The residual is measured minus predicted, so its derivative is the negative Jacobian.
 fn check<const D: usize>(
@@ -46,8 +29,8 @@ fn check<const D: usize>(
         model
     };
     let model = linearised(at);
-    let numeric = derivative(at, |at| SVector::<f64, D>::from(linearised(at).residual));
-    let analytic = SMatrix::<f64, D, STATES>::from_fn(|i, j| -model.jacobian[i][j]);
+    let numeric = derivative(STEP, |error| SVector::<f64, D>::from(linearised(&at.corrected(error)).residual));
+    let analytic = -matrix(&model.jacobian);
     let difference = (numeric - analytic).amax();
     prop_assert!(difference < 1e-6 * (1.0 + analytic.amax()), "{} is not {}", analytic, numeric);
     Ok(())
@@ -58,42 +41,21 @@ laws! {
     fn of_the_transition(at in estimate(), dt in 1e-4..0.5) {
         let mut moved = at;
         let transition = Transition::advance(&mut moved, dt);
-        let numeric = derivative(&at, |at| {
-            let mut other = *at;
+        let numeric = derivative(STEP, |error| {
+            let mut other = at.corrected(error);
             Transition::advance(&mut other, dt);
             moved.error_to(&other)
         });
         prop_assert!((numeric - transition.matrix()).amax() < 1e-6, "{} is not {}", transition.matrix(), numeric);
     }
 
-    /// T, which takes a change of an error to errors of the state that is composed with it.
     #[test]
     fn of_the_composition(
         at in estimate(), error in proptest::collection::vec(-2.0..2.0, STATES),
-        numbers in proptest::collection::vec(-1.0..1.0, STATES * STATES),
+        root in proptest::collection::vec(-1.0..1.0, STATES * STATES),
     ) {
         let error = SVector::<f64, STATES>::from_column_slice(&error);
-        let composed = PlanarEstimate::composed(&at, &error);
-        let numeric = SMatrix::<f64, STATES, STATES>::from_columns(&core::array::from_fn::<_, STATES, _>(|state| {
-            let moved = |step: f64| {
-                let mut error = error;
-                error[state] += step;
-                composed.error_to(&PlanarEstimate::composed(&at, &error))
-            };
-            (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
-        }));
-        let mut rows: [[f64; STATES]; STATES] = core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j))));
-        PlanarEstimate::transport_jacobian(&error, &mut rows);
-        let transport = SMatrix::<f64, STATES, STATES>::from_fn(|i, j| rows[i][j]);
-        prop_assert!((numeric - transport).amax() < 1e-7, "{} is not {}", transport, numeric);
-        let root = SMatrix::<f64, STATES, STATES>::from_iterator(numbers);
-        let dense = root * root.transpose();
-        let mut covariance = Covariance::<STATES>::new();
-        *covariance.rows_mut() = core::array::from_fn(|i| core::array::from_fn(|j| dense[(i, j)]));
-        PlanarEstimate::transport_covariance(&error, &mut covariance);
-        let expected = transport * dense * transport.transpose();
-        prop_assert!((covariance.matrix() - expected).amax() < 1e-12 * (1.0 + expected.amax()));
-        prop_assert_eq!(covariance.matrix(), &covariance.matrix().transpose());
+        is_transported::<PlanarEstimate, STATES>((&at, &error), root, PlanarEstimate::error_to)?;
     }
 
     #[test]
@@ -109,20 +71,18 @@ laws! {
 
     #[test]
     fn moves_the_covariance_as_the_whole_matrix_does(
-        at in estimate(), dt in 1e-3..0.1, numbers in proptest::collection::vec(-1.0..1.0, STATES * STATES),
+        at in estimate(), dt in 1e-3..0.1, root in proptest::collection::vec(-1.0..1.0, STATES * STATES),
     ) {
-        let root = SMatrix::<f64, STATES, STATES>::from_iterator(numbers);
-        let dense = root * root.transpose();
-        let mut rows: [[f64; STATES]; STATES] = core::array::from_fn(|i| core::array::from_fn(|j| dense[(i, j)]));
+        let (dense, mut covariance) = covariance::<STATES>(root);
         let none = PlanarParams { gyroscope_noise: 0.0, forward_acceleration: 0.0, ..PlanarParams::default() };
         let none = PlanarParams { gyroscope_bias_walk: 0.0, lateral_acceleration: 0.0, ..none };
         let mut moved = at;
         let transition = Transition::advance(&mut moved, dt);
-        transition.apply(&mut rows, &none.densities());
+        transition.apply(covariance.rows_mut(), &none.densities());
         let expected = transition.matrix() * dense * transition.matrix().transpose();
-        let moved = SMatrix::<f64, STATES, STATES>::from_fn(|i, j| rows[i][j]);
+        let moved = covariance.matrix();
         prop_assert!((moved - expected).amax() < 1e-12 * (1.0 + expected.amax()), "{} is not {}", moved, expected);
-        prop_assert_eq!(moved, moved.transpose());
+        prop_assert_eq!(moved, &moved.transpose());
     }
 
     #[test]

@@ -10,19 +10,20 @@ use super::super::{
     GYROSCOPE_BIAS, HEADING, PlanarFilter, PlanarHeading, PlanarParams, PlanarPose, PlanarPosition, PlanarStart,
     STATES, VELOCITY, WheelVelocity, YawRate,
 };
-use super::{sample, started, vector};
+use super::{sample, started, started_with, vector};
+use crate::navigation::eskf::tests::open;
+use crate::navigation::history::tests::{over_a_gap, replayed};
 use crate::navigation::math::wrapped;
-use crate::navigation::{Fused, History, ImuMean, Refusal, Replayed, Stream, StreamParams};
+use crate::navigation::{Fused, History, ImuMean, Refusal, Replayed, Stream};
 
 /// Three seconds with wheels, fixes, headings and poses, in a world that is rotated and shifted.
 fn drive(turn: f64, shift: Vector2<f64>) -> PlanarFilter {
     let rotation = Rotation2::new(turn);
     let to_world = |point: Vector2<f64>| rotation * point + shift;
-    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
     let start =
         PlanarStart::at(0, (to_world(Vector2::zeros()), 2.0), (0.3 + turn, 0.2), (Vector2::new(2.0, 0.0), 0.5));
-    filter.start(&start).unwrap();
-    let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+    let mut filter = started_with(PlanarParams::default(), &start);
+    let mut stream = open();
     let noise = Matrix2::new(1.0, 0.4, 0.4, 2.0);
     for i in 1..=300 {
         filter.propagate(&sample(i)).unwrap();
@@ -89,26 +90,27 @@ laws! {
         if filter.propagate(&ImuMean { time_ns, angular_velocity, specific_force: Vector3::repeat(numbers[3]) }).is_err() {
             prop_assert_eq!(&filter, &before);
         }
-        let mut updates = 0;
-        let mut law = |filter: &mut PlanarFilter, update: &dyn Fn(&mut PlanarFilter, &mut Stream) -> bool| {
-            let before = *filter;
-            updates += 1;
-            update(filter, &mut stream) || *filter == before
-        };
+        type Update<'a> = &'a dyn Fn(&mut PlanarFilter, &mut Stream) -> Result<Fused, Refusal>;
         let fix = PlanarPosition { lever_arm: pair(6), ..PlanarPosition::new(pair(4), numbers[8]) };
-        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &fix).is_ok()));
         let wheels = WheelVelocity { lever_arm: pair(2), ..WheelVelocity::new(pair(9), numbers[0]) };
-        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &wheels).is_ok()));
         let heading = PlanarHeading { heading: numbers[11], deviation: numbers[5] };
-        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &heading).is_ok()));
         let rate = YawRate { rate: numbers[7], deviation: numbers[1] };
-        prop_assert!(law(&mut filter, &|filter, stream| filter.update(stream, &rate).is_ok()));
+        let all: [Update<'_>; 4] = [
+            &|filter, stream| filter.update(stream, &fix), &|filter, stream| filter.update(stream, &wheels),
+            &|filter, stream| filter.update(stream, &heading), &|filter, stream| filter.update(stream, &rate),
+        ];
+        for update in all {
+            let before = filter;
+            if update(&mut filter, &mut stream).is_err() {
+                prop_assert_eq!(&filter, &before);
+            }
+        }
         let estimate = filter.estimate().unwrap();
         prop_assert!(estimate.position.iter().all(|x| x.is_finite()) && filter.is_consistent());
         prop_assert!((-PI..=PI).contains(&estimate.heading));
         prop_assert_eq!(filter.covariance(), &filter.covariance().transpose());
         let counts = stream.counts();
-        prop_assert_eq!(counts.fused + counts.gate + counts.invalid, updates);
+        prop_assert_eq!(counts.fused + counts.gate + counts.invalid, 4);
     }
 
     /// Fixes at sample ends that arrive this many samples late: the result equals that of arrival in order, bit for bit.
@@ -118,19 +120,11 @@ laws! {
     ) {
         const SAMPLES: i64 = 120;
         let drive = |delayed: i64| {
-            let start = Fixed { filter: started(), stream: Stream::default() };
-            let mut history = History::<_, 150, 50, 6>::new(start, 0).unwrap();
-            for i in 1..=SAMPLES {
-                history.propagate(&sample(i)).unwrap();
-                for (taken, (delay, value)) in &fixes {
-                    if (taken + delayed * delay).min(SAMPLES) == i {
-                        let fix = PlanarPosition::new(Vector2::new(*value, -value), 1.0);
-                        let result = history.update(taken * 10_000_000, &fix);
-                        assert!(matches!(result, Ok(_) | Err(Refusal::Gate { .. })), "{result:?}");
-                    }
-                }
-            }
-            history.now().clone()
+            let one = |(taken, (delay, value)): (&i64, &(i64, f64))| {
+                let fix = PlanarPosition::new(Vector2::new(*value, -value), 1.0);
+                ((taken + delayed * delay).min(SAMPLES), taken * 10_000_000, fix)
+            };
+            replayed(fixed(0), SAMPLES, sample, fixes.iter().map(one).collect()).now().clone()
         };
         prop_assert_eq!(drive(0), drive(1));
     }
@@ -140,9 +134,9 @@ laws! {
     fn the_covariance_stays_positive_definite(
         steps in proptest::collection::vec((0..5_u8, -8.0..3.0), 100..400),
     ) {
-        let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
-        filter.start(&PlanarStart::at(0, (Vector2::zeros(), 1e5), (0.0, 3.0), (Vector2::zeros(), 1e3))).unwrap();
-        let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
+        let start = PlanarStart::at(0, (Vector2::zeros(), 1e5), (0.0, 3.0), (Vector2::zeros(), 1e3));
+        let mut filter = started_with(PlanarParams::default(), &start);
+        let mut stream = open();
         for (i, (kind, exponent)) in (1..).zip(steps) {
             filter.propagate(&sample(i)).unwrap();
             let deviation = 10_f64.powf(exponent);
@@ -168,6 +162,10 @@ struct Fixed {
     stream: Stream,
 }
 
+fn fixed(hold_ns: i64) -> History<Fixed, 150, 50, 6> {
+    History::new(Fixed { filter: started(), stream: Stream::default() }, hold_ns).unwrap()
+}
+
 impl Replayed for Fixed {
     type Filter = PlanarFilter;
     type Measurement = PlanarPosition;
@@ -189,29 +187,11 @@ impl Replayed for Fixed {
 /// sample may be.
 #[test]
 fn a_gap_that_fixes_divide_is_a_gap() {
-    let after = |is_divided: bool, is_late: bool| {
-        let start = Fixed { filter: started(), stream: Stream::default() };
-        let mut history = History::<_, 150, 50, 6>::new(start, 500_000_000).unwrap();
-        (1..=20).for_each(|i| history.propagate(&sample(i)).unwrap());
-        let fixes: Vec<_> = (21..70).step_by(5).filter(|_| is_divided).collect();
-        let divide = |history: &mut History<Fixed, 150, 50, 6>| {
-            let fix = PlanarPosition::new(Vector2::zeros(), 1e6);
-            for taken in &fixes {
-                history.update(taken * 10_000_000, &fix).unwrap();
-            }
-        };
-        if !is_late {
-            divide(&mut history);
-        }
-        history.propagate(&sample(70)).unwrap();
-        if is_late {
-            divide(&mut history);
-        }
-        history.propagate(&sample(71)).unwrap();
-        history.now().clone()
-    };
-    let (whole, divided) = (after(false, false), after(true, false));
-    assert_eq!(divided, after(true, true));
+    let fix = PlanarPosition::new(Vector2::zeros(), 1e6);
+    let fixes: Vec<_> = (21..70).step_by(5).map(|taken| (taken * 10_000_000, fix)).collect();
+    let after = |fixes: &[_], is_late| over_a_gap(fixed(500_000_000), (20, 70), sample, fixes, is_late);
+    let (whole, divided) = (after(&[], false), after(&fixes, false));
+    assert_eq!(divided, after(&fixes, true));
     assert_eq!((whole.filter.gaps(), divided.filter.gaps()), (1, 11));
     for i in HEADING..=VELOCITY + 1 {
         let (whole, divided) = (whole.filter.covariance()[(i, i)], divided.filter.covariance()[(i, i)]);

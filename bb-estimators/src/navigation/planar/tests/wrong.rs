@@ -9,7 +9,7 @@ use crate::navigation::copies::{Copies, Ways};
 use crate::navigation::math::{cos, sin, sqrt, wrapped};
 use crate::navigation::noise::Noise;
 use crate::navigation::propagate::Propagate;
-use crate::navigation::{ImuMean, Stream};
+use crate::navigation::{Fused, ImuMean, Refusal, Stream};
 
 const DT: f64 = 0.01;
 const WHEELS: f64 = 0.05;
@@ -20,14 +20,48 @@ const HEADING: f64 = 0.05;
 /// The factor on deviations of readings at 10 Hz whose errors are alike for a second.
 const ALIKE: f64 = 4.58;
 
-fn copies(start: &PlanarStart) -> Copies<PlanarFilter> {
-    let mut copies = Copies::new(PlanarParams::default(), Ways { noise: true, scale: false }).unwrap();
-    copies.start(start).unwrap();
-    copies
+/// A robot on a plane, and copies of a filter with its wheels and fixes.
+struct Ride {
+    copies: Copies<PlanarFilter>,
+    wheels: Stream,
+    gnss: Stream,
+    noise: Noise,
+    position: Vector2<f64>,
+    heading: f64,
+    speed: f64,
 }
 
-fn stream() -> Stream {
-    Stream::default()
+impl Ride {
+    /// Starts copies at the origin with a heading and its deviation.
+    fn new(noise: Noise, speed: f64, heading: f64, believed: (f64, f64)) -> Self {
+        let start = PlanarStart::at(0, (Vector2::zeros(), 0.5), believed, (Vector2::new(speed, 0.0), 0.1));
+        let mut copies = Copies::new(PlanarParams::default(), Ways { noise: true, scale: false }).unwrap();
+        copies.start(&start).unwrap();
+        let [wheels, gnss] = [Stream::default(); 2];
+        Self { copies, wheels, gnss, noise, position: Vector2::zeros(), heading, speed }
+    }
+
+    /// Drives on to a sample, whose gyroscope is this much off.
+    fn drive(&mut self, i: i64, rate: f64, off: f64) {
+        let middle = self.heading + 0.5 * rate * DT;
+        self.position += Vector2::new(cos(middle), sin(middle)) * (self.speed * DT);
+        self.heading += rate * DT;
+        let (angular_velocity, specific_force) = (Vector3::new(0.0, 0.0, rate + off), Vector3::zeros());
+        self.copies.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force }).unwrap();
+    }
+
+    /// Fuses wheels of this speed with their noise.
+    fn roll(&mut self, speed: f64) {
+        let velocity = Vector2::new(speed + WHEELS * self.noise.next(), WHEELS * self.noise.next());
+        let [own, alike] = [1.0, ALIKE].map(|factor| WheelVelocity::new(velocity, factor * WHEELS));
+        let _ = self.copies.update_correlated(&mut self.wheels, &own, &alike);
+    }
+
+    /// Fuses a fix that is this far away, with its noise.
+    fn fix(&mut self, away: &Vector2<f64>) -> Result<Fused, Refusal> {
+        let fix = self.position + away + Vector2::new(self.noise.next(), self.noise.next()) * FIX;
+        self.copies.update_fix(&mut self.gnss, &PlanarPosition::new(fix, FIX))
+    }
 }
 
 /// Fault of a sensor.
@@ -84,24 +118,16 @@ impl Case {
 
     /// The errors one and two minutes after the sensors are right again.
     fn drive(&self) -> [Driven; 2] {
-        let mut noise = Noise::new(self.seed ^ 0x5eed);
-        let (mut position, mut heading, mut held) = (Vector2::zeros(), 0.3, [0.0; 4]);
-        let start = PlanarStart::at(0, (position, 0.5), (heading, 0.05), (Vector2::new(self.speed, 0.0), 0.1));
-        let mut copies = copies(&start);
-        let [mut wheels, mut rates, mut gnss, mut compass] = [stream(); 4];
+        let mut ride = Ride::new(Noise::new(self.seed ^ 0x5eed), self.speed, 0.3, (0.3, 0.05));
+        let ([mut rates, mut compass], mut held) = ([Stream::default(); 2], [0.0; 4]);
         let end_s = self.seconds.0 + self.seconds.1;
         let seen = [60.0, 120.0].map(|after_s| ((end_s + after_s) / DT) as i64);
         let mut driven = Vec::new();
         for i in 1..=seen[1] {
             let time_s = i as f64 * DT;
             let rate = self.rate.0 + self.rate.1 * sin(0.4 * time_s);
-            let middle = heading + 0.5 * rate * DT;
-            position += Vector2::new(cos(middle), sin(middle)) * (self.speed * DT);
-            heading += rate * DT;
-            let measured = rate + 0.01 + noise.next() * PlanarParams::default().gyroscope_noise / sqrt(DT);
-            let angular_velocity = Vector3::new(0.0, 0.0, measured);
-            let specific_force = Vector3::zeros();
-            copies.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force }).unwrap();
+            let off = 0.01 + ride.noise.next() * PlanarParams::default().gyroscope_noise / sqrt(DT);
+            ride.drive(i, rate, off);
             let since_s = time_s - self.seconds.0;
             let is_wrong = (0.0..self.seconds.1).contains(&since_s);
             let mut sensed = |sensor: usize, truth: f64, noise: &mut Noise| match self.faults[sensor] {
@@ -116,30 +142,27 @@ impl Case {
                 Fault::Noise(deviation) => truth + deviation * noise.next(),
             };
             if i % 10 == 0 {
-                let forward = sensed(0, self.speed, &mut noise) + WHEELS * noise.next();
-                let velocity = Vector2::new(forward, WHEELS * noise.next());
-                let [own, alike] = [1.0, ALIKE].map(|factor| WheelVelocity::new(velocity, factor * WHEELS));
-                let _ = copies.update_correlated(&mut wheels, &own, &alike);
-                let rate = sensed(1, rate, &mut noise) + YAW_RATE * noise.next();
+                let forward = sensed(0, self.speed, &mut ride.noise);
+                ride.roll(forward);
+                let rate = sensed(1, rate, &mut ride.noise) + YAW_RATE * ride.noise.next();
                 let [own, alike] = [1.0, ALIKE].map(|factor| YawRate { rate, deviation: factor * YAW_RATE });
-                let _ = copies.update_correlated(&mut rates, &own, &alike);
+                let _ = ride.copies.update_correlated(&mut rates, &own, &alike);
             }
             if i % 100 == 0 {
-                let wrong = Vector2::new(cos(self.direction), sin(self.direction)) * sensed(2, 0.0, &mut noise);
-                let fix = position + wrong * 10.0 + Vector2::new(noise.next(), noise.next()) * FIX;
-                let _ = copies.update_fix(&mut gnss, &PlanarPosition::new(fix, FIX));
+                let wrong = sensed(2, 0.0, &mut ride.noise) * 10.0;
+                let _ = ride.fix(&(Vector2::new(cos(self.direction), sin(self.direction)) * wrong));
             }
             if self.has_heading && i % 50 == 0 {
-                let heading = sensed(3, heading, &mut noise) + HEADING * noise.next();
-                let _ = copies.update(&mut compass, &PlanarHeading { heading, deviation: HEADING });
+                let heading = sensed(3, ride.heading, &mut ride.noise) + HEADING * ride.noise.next();
+                let _ = ride.copies.update(&mut compass, &PlanarHeading { heading, deviation: HEADING });
             }
             if seen.contains(&i) {
-                let estimate = copies.estimate().unwrap();
-                assert!(copies.best().is_consistent());
+                let estimate = ride.copies.estimate().unwrap();
+                assert!(ride.copies.best().is_consistent());
                 driven.push(Driven {
-                    position: (estimate.position - position).norm(),
-                    heading: wrapped(estimate.heading - heading).abs(),
-                    deviation: copies.heading_deviation(),
+                    position: (estimate.position - ride.position).norm(),
+                    heading: wrapped(estimate.heading - ride.heading).abs(),
+                    deviation: ride.copies.heading_deviation(),
                 });
             }
         }
@@ -176,27 +199,21 @@ fn whatever_was_wrong_is_over_a_minute_later() {
 #[test]
 fn an_unknown_heading_is_found_forwards_and_backwards() {
     for (seed, speed) in (1..=10).flat_map(|seed| [(seed, 2.0), (seed, -1.0)]) {
-        let velocity = Vector2::new(speed, 0.0);
-        let mut copies = copies(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 4.0), (velocity, 0.1)));
-        let (mut wheels, mut gnss, mut noise) = (stream(), stream(), Noise::new(seed));
+        let mut noise = Noise::new(seed);
         let heading = noise.between(-3.0, 3.0);
+        let mut ride = Ride::new(noise, speed, heading, (0.0, 4.0));
         let mut known_s = None;
         for i in 1..=3000_i64 {
-            let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::zeros());
-            copies.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force }).unwrap();
+            ride.drive(i, 0.0, 0.0);
             if i % 10 == 0 {
-                let velocity = velocity + Vector2::new(noise.next(), noise.next()) * WHEELS;
-                let [own, alike] = [1.0, ALIKE].map(|factor| WheelVelocity::new(velocity, factor * WHEELS));
-                let _ = copies.update_correlated(&mut wheels, &own, &alike);
+                ride.roll(speed);
             }
             if i % 100 == 0 {
-                let way = Vector2::new(cos(heading), sin(heading)) * (speed * 0.01 * i as f64);
-                let fix = way + Vector2::new(noise.next(), noise.next()) * FIX;
-                copies.update_fix(&mut gnss, &PlanarPosition::new(fix, FIX)).unwrap();
-                let deviation = copies.heading_deviation();
+                ride.fix(&Vector2::zeros()).unwrap();
+                let deviation = ride.copies.heading_deviation();
                 if deviation < 0.5 {
                     known_s = known_s.or(Some(i / 100));
-                    let off = wrapped(copies.estimate().unwrap().heading - heading).abs();
+                    let off = wrapped(ride.copies.estimate().unwrap().heading - heading).abs();
                     assert!(off < 4.0 * deviation, "{seed}, {speed} m/s, {i}: {off} of {deviation}");
                 }
             }
@@ -209,29 +226,19 @@ fn an_unknown_heading_is_found_forwards_and_backwards() {
 #[test]
 fn fixes_that_stay_elsewhere_move_the_filter() {
     for (wrong_s, resets) in [(15, 1), (60, 3)] {
-        let velocity = Vector2::new(2.0, 0.0);
-        let mut copies = copies(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.3, 0.05), (velocity, 0.1)));
-        let (mut wheels, mut gnss, mut noise) = (stream(), stream(), Noise::new(3));
-        let (mut position, mut heading) = (Vector2::zeros(), 0.3);
+        let mut ride = Ride::new(Noise::new(3), 2.0, 0.3, (0.3, 0.05));
         for i in 1..=18_000_i64 {
-            let rate = 0.2 * sin(0.003 * i as f64);
-            heading += rate * DT;
-            position += Vector2::new(cos(heading), sin(heading)) * (2.0 * DT);
-            let (angular_velocity, specific_force) = (Vector3::new(0.0, 0.0, rate), Vector3::zeros());
-            copies.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force }).unwrap();
+            ride.drive(i, 0.2 * sin(0.003 * i as f64), 0.0);
             if i % 10 == 0 {
-                let velocity = velocity + Vector2::new(noise.next(), noise.next()) * WHEELS;
-                let _ = copies.update(&mut wheels, &WheelVelocity::new(velocity, WHEELS * ALIKE));
+                ride.roll(2.0);
             }
             if i % 100 == 0 {
                 let is_wrong = (6000..6000 + 100 * wrong_s).contains(&i);
-                let away = if is_wrong { Vector2::new(300.0, -400.0) } else { Vector2::zeros() };
-                let fix = position + away + Vector2::new(noise.next(), noise.next()) * FIX;
-                let _ = copies.update_fix(&mut gnss, &PlanarPosition::new(fix, FIX));
+                let _ = ride.fix(&if is_wrong { Vector2::new(300.0, -400.0) } else { Vector2::zeros() });
             }
         }
-        let off = (copies.estimate().unwrap().position - position).norm();
+        let off = (ride.copies.estimate().unwrap().position - ride.position).norm();
         assert!(off < 1.5, "{wrong_s} s: {off} m");
-        assert_eq!(copies.best().resets(), resets, "{wrong_s} s");
+        assert_eq!(ride.copies.best().resets(), resets, "{wrong_s} s");
     }
 }
