@@ -6,7 +6,8 @@ mod automatic;
 #[cfg(feature = "std")]
 mod batch;
 mod cases;
-mod consistency;
+#[cfg(feature = "std")]
+mod dense;
 mod factors;
 mod flight;
 mod kernels;

@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::flight::{DT_NS, Drone, Flight, N, Smoother, linear, open, sample, sensors};
+use super::flight::{DT_NS, Drone, Flight, N, Smoother, converged, linear, open, sample, sensors};
+use crate::navigation::eskf::tests::bad_samples_are_refused;
 use crate::navigation::{
     AbsolutePose, EskfFilter, Estimate, FixedLagSmoother, GaussMarkov, GnssPosition, ImuMean, Kernel, NAVIGATION,
-    Navigation, NavigationFactor, Refusal, RelativePose, SmootherParams, Start, Stream, StreamParams,
+    Navigation, NavigationFactor, Refusal, RelativePose, SmootherParams, Start, Stream,
 };
 
 type Plain = FixedLagSmoother;
@@ -50,29 +51,25 @@ fn refusals_are_named_and_counted() {
     assert_eq!(smoother.keyframes().collect::<Vec<_>>(), [2, 3, 4]);
     let time_ns = 400_000_000;
     let refused = Refusal::TimeNotIncreasing { previous_ns: time_ns, time_ns };
-    assert_eq!(smoother.propagate(&rest(time_ns)), Err(refused));
     assert_eq!(smoother.add_keyframe(5), Err(refused), "no sample since the last");
+    bad_samples_are_refused(time_ns, |sample| smoother.propagate(sample));
     smoother.propagate(&rest(time_ns + DT_NS)).unwrap();
     assert!(matches!(smoother.add_keyframe(4), Err(Refusal::TimeNotIncreasing { .. })), "an id twice");
-    let nan = ImuMean { angular_velocity: Vector3::new(0.0, f64::NAN, 0.0), ..rest(2 * time_ns) };
-    assert_eq!(smoother.propagate(&nan), Err(Refusal::NonFinite));
-    let wild = ImuMean { specific_force: Vector3::new(0.0, 1e7, 0.0), ..rest(2 * time_ns) };
-    assert_eq!(smoother.propagate(&wild), Err(Refusal::OutOfRange));
-    assert!(matches!(smoother.propagate(&rest(i64::MAX)), Err(Refusal::Gap { .. })));
     // Keyframe 1 has left the window, keyframe 2 has no previous keyframe, and keyframe 4 is no earlier one.
     let relative = |id| RelativePose::new(id, (Vector3::zeros(), 0.1), (level(), 0.1));
-    assert_eq!(smoother.add(&mut stream, 1, fix), Err(Refusal::NoKeyframe { id: 1 }));
-    assert_eq!(smoother.add(&mut stream, 2, relative(1)), Err(Refusal::NoKeyframe { id: 1 }));
-    assert_eq!(smoother.add(&mut stream, 3, relative(4)), Err(Refusal::NoKeyframe { id: 4 }));
-    let nan = GnssPosition::new(Vector3::new(f64::NAN, 0.0, 0.0), 1.0, 1.0);
-    assert_eq!(smoother.add(&mut stream, 4, nan), Err(Refusal::NonFinite));
-    let mut negative = fix;
-    negative.covariance = -Matrix3::identity();
-    assert_eq!(smoother.add(&mut stream, 4, negative), Err(Refusal::Noise));
-    let absurd = GnssPosition::new(Vector3::new(1e20, 0.0, 0.0), 1.0, 1.0);
-    assert_eq!(smoother.add(&mut stream, 4, absurd), Err(Refusal::OutOfRange));
-    let outlier = GnssPosition::new(Vector3::new(100.0, 0.0, 0.0), 1.0, 1.0);
-    assert!(matches!(smoother.add(&mut stream, 4, outlier), Err(Refusal::Gate { .. })));
+    let at = |x: f64| GnssPosition::new(Vector3::new(x, 0.0, 0.0), 1.0, 1.0);
+    let refused: [(u64, NavigationFactor, Refusal); 6] = [
+        (1, fix.into(), Refusal::NoKeyframe { id: 1 }),
+        (2, relative(1).into(), Refusal::NoKeyframe { id: 1 }),
+        (3, relative(4).into(), Refusal::NoKeyframe { id: 4 }),
+        (4, at(f64::NAN).into(), Refusal::NonFinite),
+        (4, GnssPosition { covariance: -Matrix3::identity(), ..fix }.into(), Refusal::Noise),
+        (4, at(1e20).into(), Refusal::OutOfRange),
+    ];
+    for (id, factor, refusal) in refused {
+        assert_eq!(smoother.add(&mut stream, id, factor), Err(refusal), "{factor:?}");
+    }
+    assert!(matches!(smoother.add(&mut stream, 4, at(100.0)), Err(Refusal::Gate { .. })));
     smoother.add(&mut stream, 4, fix).unwrap();
     smoother.add(&mut stream, 4, relative(3)).unwrap();
     assert_eq!(smoother.add(&mut stream, 4, fix), Err(Refusal::Full { id: 4 }));
@@ -126,10 +123,7 @@ fn the_newest_covariance_is_that_of_the_filter() {
 /// is tiny relative to its diagonal. It is still correct.
 #[test]
 fn a_tiny_pivot_is_no_trouble() {
-    let params = SmootherParams { window: 10, ..SmootherParams::default() };
-    let mut smoother = Plain::new(params).unwrap();
-    let start = Start::at(0, (Vector3::zeros(), 1e6), (Vector3::zeros(), 0.1), (level(), 0.05));
-    smoother.start(0, &start).unwrap();
+    let mut smoother = at_rest(SmootherParams { window: 10, ..SmootherParams::default() }, 1e6, 1);
     for k in 1..200 {
         smoother.propagate(&rest(k * 1_000_000)).unwrap();
         smoother.add_keyframe(k as u64).unwrap();
@@ -238,28 +232,26 @@ fn a_warm_start_has_what_the_filter_has() {
     assert!((plain.covariance().unwrap() - of_navigation).amax() < 1e-8);
     plain.propagate(&sample(391)).unwrap();
     plain.add_keyframe(40).unwrap();
-    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &-covariance), Err(Refusal::Noise));
-    let mut broken = covariance;
+    let (mut broken, mut skewed) = (covariance, covariance);
     broken[(3, 4)] = f64::NAN;
-    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &broken), Err(Refusal::NonFinite));
     // Positive definite only if half of it is read.
-    let mut skewed = covariance;
     skewed[(0, 1)] += 3.0 * covariance[(0, 0)];
-    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &skewed), Err(Refusal::Noise));
-    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &(covariance * 1e-300)), Err(Refusal::Noise));
+    for (bad, refusal) in [
+        (-covariance, Refusal::Noise),
+        (broken, Refusal::NonFinite),
+        (skewed, Refusal::Noise),
+        (covariance * 1e-300, Refusal::Noise),
+    ] {
+        assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &bad), Err(refusal), "{bad}");
+    }
+    let nowhere = UnitQuaternion::new_unchecked(nalgebra::Quaternion::default());
     for (absurd, refusal) in [
         (Estimate { position: Vector3::x() * f64::NAN, ..estimate }, Refusal::NonFinite),
         (Estimate { position: Vector3::x() * 1e12, ..estimate }, Refusal::OutOfRange),
         (Estimate { gyroscope_bias: Vector3::x() * 1e9, ..estimate }, Refusal::OutOfRange),
         (Estimate { angular_velocity: Vector3::x() * f64::INFINITY, ..estimate }, Refusal::NonFinite),
         (Estimate { specific_force: Vector3::x() * 1e200, ..estimate }, Refusal::OutOfRange),
-        (
-            Estimate {
-                world_from_body: UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 0.0)),
-                ..estimate
-            },
-            Refusal::NonFinite,
-        ),
+        (Estimate { world_from_body: nowhere, ..estimate }, Refusal::NonFinite),
     ] {
         assert_eq!(plain.adopt::<Drone, N>(41, &absurd, &covariance), Err(refusal), "{absurd:?}");
     }
@@ -267,8 +259,7 @@ fn a_warm_start_has_what_the_filter_has() {
     // Any time is a time.
     for time_ns in [i64::MIN, -1, i64::MAX] {
         plain.adopt::<Drone, N>(41, &Estimate { time_ns, ..estimate }, &covariance).unwrap();
-        let next = sample(392);
-        let gone = plain.propagate(&next);
+        let gone = plain.propagate(&sample(392));
         assert_eq!(gone.is_ok(), time_ns == -1, "{gone:?}");
         assert!(plain.predicted().unwrap().is_finite());
     }
@@ -279,18 +270,15 @@ fn a_warm_start_has_what_the_filter_has() {
 fn relative_poses_of_any_two_keyframes() {
     let flight = Flight::new(3, 12, 1.0);
     let mut smoother = flight.flown(linear(6));
-    let mut stream = Stream::new(StreamParams::default());
-    let (from, to) = (flight.truth[7], flight.truth[11]);
-    let back = from.world_from_body.inverse();
-    let way = back * (to.position - from.position);
-    let pose = RelativePose::new(7, (way, 0.05), (back * to.world_from_body, 2e-3));
+    let mut stream = Stream::default();
+    let pose = flight.relative_pose(7, 11, &Vector3::zeros(), &Vector3::zeros());
     let refused = smoother.add(&mut stream, 11, pose);
     assert_eq!(refused, Err(Refusal::NotAdjacent { id: 7 }));
     let error = refused.unwrap_err().to_string();
     assert_eq!(error, "keyframe 7 is not the one directly before, and more than the poses is compared");
     let gone = RelativePose { keyframe: 5, ..pose };
     assert_eq!(smoother.add(&mut stream, 11, NavigationFactor::Between(gone)), Err(Refusal::NoKeyframe { id: 5 }));
-    let wrong = RelativePose { translation: way + Vector3::x(), ..pose };
+    let wrong = RelativePose { translation: pose.translation + Vector3::x(), ..pose };
     let wrong = smoother.add(&mut stream, 11, NavigationFactor::Between(wrong));
     assert!(matches!(wrong, Err(Refusal::Gate { .. })), "{wrong:?}");
     let before = smoother.covariance().unwrap();
@@ -308,11 +296,8 @@ fn relative_poses_of_any_two_keyframes() {
 fn an_outlier_between_any_two_keyframes() {
     let flight = Flight::new(4, 30, 1.0);
     let flown = |kernel: Option<Kernel>| {
-        let mut smoother = flight.flown(super::flight::converged(12));
-        let (from, to) = (flight.truth[20], flight.truth[29]);
-        let back = from.world_from_body.inverse();
-        let way = back * (to.position - from.position) + Vector3::x() * 3.0;
-        let pose = RelativePose::new(20, (way, 0.05), (back * to.world_from_body, 2e-3));
+        let mut smoother = flight.flown(converged(12));
+        let pose = flight.relative_pose(20, 29, &(Vector3::x() * 3.0), &Vector3::zeros());
         if let Some(kernel) = kernel {
             smoother.add_robust(&mut open(), 29, NavigationFactor::Between(pose), kernel).unwrap();
         }

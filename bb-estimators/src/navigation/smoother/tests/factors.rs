@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::super::link::{Link, predicted};
-use super::flight::{Drone, N, sensors};
+use super::flight::{Drone, N, derivative, matrix, sensors, vector};
 use crate::navigation::factor::Factor;
 use crate::navigation::factor::Rows;
 use crate::navigation::{
@@ -15,11 +15,6 @@ use crate::navigation::{
 };
 
 type Error = SVector<f64, N>;
-
-fn vector(limit: f64) -> impl Strategy<Value = Vector3<f64>> {
-    let number = move || -limit..limit;
-    (number(), number(), number()).prop_map(|(x, y, z)| Vector3::new(x, y, z))
-}
 
 fn estimate() -> impl Strategy<Value = Estimate<N>> {
     let motion = (vector(100.0), vector(20.0), vector(3.0), vector(0.3), vector(0.05));
@@ -83,26 +78,16 @@ laws! {
         let here = rows(&previous, &at);
         let cost = |rows: &Rows<N>| 0.5 * rows.residual[..rows.count].iter().map(|r| r * r).sum::<f64>();
         for of_previous in [true, false] {
-            let jacobian = if of_previous { &here.previous } else { &here.at };
-            let mut analytic = Error::zeros();
-            for row in 0..here.count {
-                for i in 0..N {
-                    analytic[i] += jacobian[row][i] * here.residual[row];
-                }
-            }
-            for state in 0..N {
-                let step = 1e-5;
-                let [above, below] = [step, -step].map(|step| {
-                    let mut error = Error::zeros();
-                    error[state] = step;
-                    let moved = |estimate: &Estimate<N>| estimate.corrected::<Drone>(&error);
-                    cost(&if of_previous { rows(&moved(&previous), &at) } else { rows(&previous, &moved(&at)) })
-                });
-                let numeric = (below - above) / (2.0 * step);
-                let scale = 1.0 + analytic.amax() + cost(&here);
-                prop_assert!((numeric - analytic[state]).abs() < 1e-5 * scale,
-                    "state {state} of {of_previous}: {numeric}, not {}", analytic[state]);
-            }
+            let jacobian = matrix(if of_previous { &here.previous } else { &here.at });
+            let analytic = jacobian.transpose() * matrix(&[here.residual]).transpose();
+            let numeric = derivative::<1, N>(1e-5, |error| {
+                let moved = |estimate: &Estimate<N>| estimate.corrected::<Drone>(error);
+                let rows = if of_previous { rows(&moved(&previous), &at) } else { rows(&previous, &moved(&at)) };
+                [-cost(&rows)].into()
+            });
+            let apart = (numeric.transpose() - analytic).amax();
+            let scale = 1.0 + analytic.amax() + cost(&here);
+            prop_assert!(apart < 1e-5 * scale, "of the previous: {of_previous}: {numeric}, not {analytic}");
         }
     }
 
@@ -112,7 +97,7 @@ laws! {
         let motion = motion(samples, turn, Vector3::new(3.0, -1.0, 9.0));
         let to = predicted::<Drone, N>(&from, &motion, &sensors()).corrected::<Drone>(&(off * 0.3));
         let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &sensors());
-        let back = SMatrix::<f64, N, N>::from_fn(|i, j| link.back[i][j]);
+        let back = matrix(&link.back);
         let apart = (back * turned(&to) - turned(&from)).amax();
         prop_assert!(apart < 1e-9, "{apart}");
         let factor = NavigationFactor::from(relative(&from, &to, &Vector3::new(0.3, -0.2, 0.1)));
@@ -139,30 +124,21 @@ laws! {
         let there = |from: &Estimate<N>| predicted::<Drone, N>(from, &motion, &params);
         let to = there(&from);
         let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &params);
-        let error = |error: &Error| to.error_to::<Drone>(&there(&from.corrected::<Drone>(error)));
-        let back = SMatrix::<f64, N, N>::from_fn(|i, j| link.back[i][j]);
-        let mut forward = SMatrix::<f64, N, N>::zeros();
-        for state in 0..N {
-            let step = 1e-5;
-            let mut unit = Error::zeros();
-            unit[state] = step;
-            forward.set_column(state, &((error(&unit) - error(&-unit)) / (2.0 * step)));
-        }
+        let back = matrix(&link.back);
+        let forward = derivative(1e-5, |error| to.error_to::<Drone>(&there(&from.corrected::<Drone>(error))));
         let product = back * forward;
         let apart = (product - SMatrix::identity()).amax();
         // The derivative by the gyroscope's bias is of second order in the turn of a sample.
         prop_assert!(apart < 1e-5, "{apart}: {product:.6}");
         prop_assert!(link.offset.iter().all(|x| x.abs() < 1e-9));
         // Forward, the noise is that of preintegration, in the axes of the first body.
-        let noise = SMatrix::<f64, N, N>::from_fn(|i, j| link.noise[i][j]);
+        let noise = matrix(&link.noise);
         let forward = forward * noise * forward.transpose();
         let mut to_world = SMatrix::<f64, NAVIGATION, NAVIGATION>::identity();
         for first in [POSITION, VELOCITY, ROTATION] {
             to_world.fixed_view_mut::<3, 3>(first, first).copy_from(&from.rotation());
         }
-        let covariance = motion.covariance();
-        let covariance = SMatrix::<f64, NAVIGATION, NAVIGATION>::from_fn(|i, j| covariance[i][j]);
-        let known = to_world * covariance * to_world.transpose();
+        let known = to_world * matrix(&motion.covariance()) * to_world.transpose();
         for i in 0..NAVIGATION {
             for j in 0..NAVIGATION {
                 let scale = (known[(i, i)] * known[(j, j)]).sqrt();
@@ -181,14 +157,13 @@ fn rows_are_divided_by_their_noise() {
     let mut rows = Rows::<3>::new();
     rows.set([0.3, -0.7], Some(&previous), &at, &noise).unwrap();
     let inverse = noise.try_inverse().unwrap();
-    let whole = |jacobian: &[[f64; 3]; 2]| SMatrix::<f64, 2, 3>::from_fn(|i, j| jacobian[i][j]);
     let residual = SVector::<f64, 2>::new(0.3, -0.7);
     for (jacobian, whitened) in [(&at, &rows.at), (&previous, &rows.previous)] {
-        let matrix = SMatrix::<f64, 2, 3>::from_fn(|i, j| whitened[i][j]);
-        let known = whole(jacobian).transpose() * inverse * whole(jacobian);
-        assert!((matrix.transpose() * matrix - known).amax() < 1e-13);
+        let (whole, whitened) = (matrix(jacobian), matrix(whitened).fixed_rows::<2>(0).into_owned());
+        let weighted = whole.transpose() * inverse;
+        assert!((whitened.transpose() * whitened - weighted * whole).amax() < 1e-13);
         let vector = SVector::<f64, 2>::new(rows.residual[0], rows.residual[1]);
-        assert!((matrix.transpose() * vector - whole(jacobian).transpose() * inverse * residual).amax() < 1e-13);
+        assert!((whitened.transpose() * vector - weighted * residual).amax() < 1e-13);
     }
     assert!((rows.log_density + 0.5 * noise.determinant().ln()).abs() < 1e-13);
 }

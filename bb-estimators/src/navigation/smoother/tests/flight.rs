@@ -1,12 +1,14 @@
 //! A simulated flight, with the noise that the smoother is told, or none.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use proptest::prelude::*;
 
+pub(super) use crate::navigation::eskf::tests::{derivative, matrix, open, sample, vector};
 use crate::navigation::math::rotation;
 use crate::navigation::noise::Noise;
 use crate::navigation::{
     AbsolutePose, EskfParams, Estimate, FixedLagSmoother, GaussMarkov, GnssPosition, GnssVelocity, ImuMean,
-    NavigationFactor, Optional, RelativePose, SmootherParams, Start, States,
+    NavigationFactor, Optional, Preintegration, RelativePose, SmootherParams, Start, States, nees,
 };
 
 /// A flight with a camera whose scale drifts and an antenna with an offset from its nominal position.
@@ -24,6 +26,36 @@ pub(super) type Smoother = FixedLagSmoother<Drone, N>;
 /// The largest difference of two estimates, each component in its unit.
 pub(super) fn apart(a: &Estimate<N>, b: &Estimate<N>) -> f64 {
     a.error_to::<Drone>(b).amax()
+}
+
+/// The largest difference of two covariances, relative to the variances.
+pub(super) fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
+    let off = |i: usize, j: usize| (a[(i, j)] - b[(i, j)]).abs() / (a[(i, i)] * a[(j, j)]).sqrt();
+    (0..N * N).map(|entry| off(entry / N, entry % N)).fold(0.0, f64::max)
+}
+
+/// The largest difference of two variances, as a fraction.
+pub(super) fn variances_differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
+    (0..N).map(|i| (a[(i, i)] / b[(i, i)] - 1.0).abs()).fold(0.0, f64::max)
+}
+
+/// Checks that the estimates of each keyframe of `some` and `all` are apart by less than the first number, and its covariances, by the
+/// measure that is given, by less than the second.
+pub(super) fn agree(
+    some: &Smoother,
+    all: &Smoother,
+    within: (f64, f64),
+    difference: impl Fn(&SMatrix<f64, N, N>, &SMatrix<f64, N, N>) -> f64,
+) -> Result<(), TestCaseError> {
+    let (mut some, mut all) = (some.clone(), all.clone());
+    for id in some.keyframes().collect::<Vec<_>>() {
+        let off = apart(&all.smoothed(id).unwrap(), &some.smoothed(id).unwrap());
+        prop_assert!(off < within.0, "{id}: {off}");
+        let of_all = all.smoothed_covariance(id).unwrap();
+        let off = difference(&of_all, &some.smoothed_covariance(id).unwrap());
+        prop_assert!(off < within.1, "{id}: {off} of the covariance");
+    }
+    Ok(())
 }
 
 /// Number of samples between two keyframes, and their length.
@@ -53,6 +85,11 @@ pub(super) fn converged(window: usize) -> SmootherParams {
     SmootherParams { relinearise_rotation: 0.0, relinearise_position: 0.0, iterations: 20, ..linear(window) }
 }
 
+/// The smoother's defaults with a window of this many keyframes.
+pub(super) fn usual(window: usize) -> SmootherParams {
+    SmootherParams { sensors: sensors(), window, ..SmootherParams::default() }
+}
+
 /// The true flight and its measurements.
 pub(super) struct Flight {
     pub(super) start: Start,
@@ -61,16 +98,13 @@ pub(super) struct Flight {
     /// The measurements at keyframe k.
     pub(super) measured: Vec<Vec<NavigationFactor>>,
     /// The truth at keyframe k.
-    pub(super) truth: Vec<Truth>,
+    pub(super) truth: Vec<Estimate<N>>,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Truth {
-    pub(super) position: Vector3<f64>,
-    pub(super) velocity: Vector3<f64>,
-    pub(super) world_from_body: UnitQuaternion<f64>,
-    pub(super) accelerometer_bias: Vector3<f64>,
-    pub(super) gyroscope_bias: Vector3<f64>,
+/// The displacement and rotation from one pose to another, in the axes of the first.
+fn relative(from: &Estimate<N>, to: &Estimate<N>) -> (Vector3<f64>, UnitQuaternion<f64>) {
+    let back = from.world_from_body.inverse();
+    (back * (to.position - from.position), back * to.world_from_body)
 }
 
 impl Flight {
@@ -86,12 +120,13 @@ impl Flight {
             gyroscope_bias_deviation: 0.01,
             ..Start::at(0, (Vector3::zeros(), 1.0), (velocity, 0.3), (level_start, 0.05))
         };
-        let mut truth = Truth {
+        let mut truth = Estimate {
             position: draw(1.0),
             velocity: velocity + draw(0.3),
             world_from_body: rotation(&draw(0.05)) * level_start,
             accelerometer_bias: draw(0.1),
             gyroscope_bias: draw(0.01),
+            ..Estimate::unknown()
         };
         let mut scale = draw(0.02).x;
         let lever_arm = draw(0.2);
@@ -101,7 +136,7 @@ impl Flight {
             let mut samples = Vec::new();
             for i in (k - 1) * SAMPLES + 1..=k * SAMPLES {
                 let ImuMean { time_ns, angular_velocity, specific_force } = sample(i);
-                let mut motion = crate::navigation::Preintegration::new(Vector3::zeros(), Vector3::zeros());
+                let mut motion = Preintegration::new(Vector3::zeros(), Vector3::zeros());
                 motion.add(&angular_velocity, &specific_force, DT, &params.densities());
                 let fall = Vector3::new(0.0, 0.0, -params.gravity * DT);
                 truth.position +=
@@ -123,9 +158,8 @@ impl Flight {
             let GaussMarkov { deviation, time_s } = params.relative_scale;
             let kept = (-(SAMPLES as f64) * DT / time_s).exp();
             scale = scale * kept + draw(deviation * (1.0 - kept * kept).sqrt()).x;
-            let back = before.world_from_body.inverse();
-            let way = back * (truth.position - before.position) * (1.0 + scale) + draw(0.05);
-            let turn = back * truth.world_from_body * rotation(&draw(2e-3));
+            let (way, turn) = relative(&before, &truth);
+            let (way, turn) = (way * (1.0 + scale) + draw(0.05), turn * rotation(&draw(2e-3)));
             let id = u64::try_from(k - 1).unwrap();
             let mut measured = vec![RelativePose::new(id, (way, 0.05), (turn, 2e-3)).into()];
             if k % 5 == 0 {
@@ -153,14 +187,23 @@ impl Flight {
             if span > most.min(k) {
                 continue;
             }
-            let (from, to) = (self.truth[k - span], self.truth[k]);
-            let back = from.world_from_body.inverse();
-            let way = back * (to.position - from.position) + noise.vector(0.05);
-            let turn = back * to.world_from_body * rotation(&noise.vector(2e-3));
-            let pose = RelativePose::new((k - span) as u64, (way, 0.05), (turn, 2e-3));
+            let off = (noise.vector(0.05), noise.vector(2e-3));
+            let pose = self.relative_pose(k - span, k, &off.0, &off.1);
             self.measured[k].push(NavigationFactor::Between(pose));
         }
         self
+    }
+
+    /// The pose of one keyframe relative to an earlier one, with these errors.
+    pub(super) fn relative_pose(
+        &self,
+        from: usize,
+        to: usize,
+        off: &Vector3<f64>,
+        off_rotation: &Vector3<f64>,
+    ) -> RelativePose {
+        let (way, turn) = relative(&self.truth[from], &self.truth[to]);
+        RelativePose::new(from as u64, (way + off, 0.05), (turn * rotation(off_rotation), 2e-3))
     }
 
     /// Returns the flight in a world that is turned about its origin, and then moved.
@@ -184,16 +227,27 @@ impl Flight {
         self
     }
 
-    /// Flies the whole flight, with an update at each keyframe.
-    pub(super) fn flown(&self, params: SmootherParams) -> Smoother {
+    /// A smoother at the start of the flight.
+    pub(super) fn begun(&self, params: SmootherParams) -> Smoother {
         let mut smoother = Smoother::new(params).unwrap();
         smoother.start(0, &self.start).unwrap();
+        smoother
+    }
+
+    /// Flies the whole flight, with an update at each keyframe.
+    pub(super) fn flown(&self, params: SmootherParams) -> Smoother {
+        let mut smoother = self.begun(params);
         for k in 1..self.samples.len() {
-            self.fly_to(&mut smoother, k);
-            self.measure(&mut smoother, k);
+            self.advance(&mut smoother, k);
             smoother.update().unwrap();
         }
         smoother
+    }
+
+    /// Flies to keyframe k and adds its measurements.
+    pub(super) fn advance(&self, smoother: &mut Smoother, k: usize) {
+        self.fly_to(smoother, k);
+        self.measure(smoother, k);
     }
 
     /// Flies from keyframe k - 1 to keyframe k, which is added.
@@ -211,33 +265,15 @@ impl Flight {
         }
     }
 
-    pub(super) fn error(&self, k: usize, estimate: &Estimate<N>) -> nalgebra::SVector<f64, 15> {
-        let truth = &self.truth[k];
-        let mut error = nalgebra::SVector::<f64, 15>::zeros();
-        let mut set = |first: usize, part: Vector3<f64>| error.fixed_rows_mut::<3>(first).copy_from(&part);
-        set(0, truth.position - estimate.position);
-        set(3, truth.velocity - estimate.velocity);
-        set(6, (truth.world_from_body * estimate.world_from_body.inverse()).scaled_axis());
-        set(9, truth.accelerometer_bias - estimate.accelerometer_bias);
-        set(12, truth.gyroscope_bias - estimate.gyroscope_bias);
-        error
+    /// The error of the navigation states at keyframe k.
+    pub(super) fn error(&self, k: usize, estimate: &Estimate<N>) -> SVector<f64, 15> {
+        estimate.error_to::<Drone>(&self.truth[k]).fixed_rows::<15>(0).into_owned()
     }
-}
 
-/// A stream without a gate.
-pub(super) fn open() -> crate::navigation::Stream {
-    crate::navigation::Stream::new(crate::navigation::StreamParams {
-        gate: 0.0,
-        ..crate::navigation::StreamParams::default()
-    })
-}
-
-/// A flight that turns and accelerates, sampled at 100 Hz.
-pub(super) fn sample(i: i64) -> ImuMean {
-    let t = i as f64 * DT;
-    ImuMean {
-        time_ns: i * DT_NS,
-        angular_velocity: Vector3::new(0.3 * t.sin(), 0.2 * (1.3 * t).cos(), 0.4 * (0.7 * t).sin()),
-        specific_force: Vector3::new(t.cos(), (0.8 * t).sin(), 9.8 + 0.5 * (0.5 * t).sin()),
+    /// The normalised error at keyframe k.
+    pub(super) fn nees(&self, k: usize, smoother: &Smoother) -> f64 {
+        let mut smoother = smoother.clone();
+        let covariance = smoother.smoothed_covariance(k as u64).unwrap().fixed_view::<15, 15>(0, 0).into_owned();
+        nees(&self.error(k, &smoother.smoothed(k as u64).unwrap()), &covariance).unwrap()
     }
 }

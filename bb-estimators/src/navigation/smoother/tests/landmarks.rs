@@ -1,14 +1,12 @@
 //! Landmarks against a dense batch solution that has them as unknowns of their own, on random problems.
 
 use bb_tests::laws;
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
 
-use super::super::coupling::POSE;
 use super::super::landmark::Sight;
-use super::super::link::{Information, Link};
-use super::super::matrix::Square;
-use super::flight::open;
+use super::dense::{Dense, agrees, agrees_at};
+use super::flight::{matrix, open};
 use crate::navigation::camera::Undistorted;
 use crate::navigation::factor::Rows;
 use crate::navigation::noise::Noise;
@@ -20,14 +18,6 @@ use crate::navigation::{
 type Plain = FixedLagSmoother;
 const N: usize = NAVIGATION;
 
-fn square(matrix: &SMatrix<f64, N, N>) -> Square<N> {
-    core::array::from_fn(|i| core::array::from_fn(|j| matrix[(i, j)]))
-}
-
-fn random(noise: &mut Noise) -> SMatrix<f64, N, N> {
-    SMatrix::from_fn(|_, _| noise.next())
-}
-
 /// Two solutions may be apart by this part of the rounding of one number, times the condition of the system. The most found is
 /// 0.006, at a stored seed with a condition of 2e9.
 const ROUNDING: f64 = 0.02;
@@ -35,8 +25,7 @@ const ROUNDING: f64 = 0.02;
 /// A smoother with a random problem in its window, and the same problem as one dense system: keyframes first, then landmarks.
 struct Problem {
     smoother: Plain,
-    matrix: DMatrix<f64>,
-    vector: DVector<f64>,
+    dense: Dense<N>,
     keyframes: usize,
 }
 
@@ -54,9 +43,7 @@ impl Problem {
         smoother.landmarks.as_mut().unwrap().known_within = f64::INFINITY;
         let level = (UnitQuaternion::identity(), 1.0);
         smoother.start(0, &Start::at(0, (Vector3::zeros(), 1.0), (Vector3::zeros(), 1.0), level)).unwrap();
-        let size = keyframes * N + 3 * landmarks;
-        let mut problem =
-            Self { smoother, matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), keyframes };
+        let mut problem = Self { smoother, dense: Dense::new(keyframes * N + 3 * landmarks), keyframes };
         for k in 0..keyframes {
             problem.keyframe(&mut noise, k);
         }
@@ -70,20 +57,18 @@ impl Problem {
     /// The covariance and the solution of the dense system, refined: its inverse alone loses digits to its condition. The last
     /// number is how far apart two solutions in floating point may be, as a fraction.
     fn batch(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let rough = self.matrix.clone().cholesky().unwrap().inverse();
-        let identity = DMatrix::identity(self.matrix.nrows(), self.matrix.ncols());
-        let covariance = &rough + &rough * (identity - &self.matrix * &rough);
-        let solution = &covariance * &self.vector;
-        let refined = &solution + &covariance * (&self.vector - &self.matrix * &solution);
-        let condition = self.matrix.norm() * covariance.norm();
+        let Dense { matrix, vector } = &self.dense;
+        let rough = matrix.clone().cholesky().unwrap().inverse();
+        let identity = DMatrix::identity(matrix.nrows(), matrix.ncols());
+        let covariance = &rough + &rough * (identity - matrix * &rough);
+        let solution = &covariance * vector;
+        let refined = &solution + &covariance * (vector - matrix * &solution);
+        let condition = matrix.norm() * covariance.norm();
         (covariance, refined, 1e-8_f64.max(ROUNDING * f64::EPSILON * condition))
     }
 
     fn keyframe(&mut self, noise: &mut Noise, k: usize) {
-        let root = random(noise);
-        let of_rank = SMatrix::<f64, N, N>::from_fn(|i, j| if k == 0 || i < k % 3 { root[(i, j)] } else { 0.0 });
-        let known = of_rank.transpose() * of_rank + SMatrix::identity() * if k == 0 { 0.5 } else { 0.0 };
-        let vector = known * SVector::<f64, N>::from_fn(|_, _| noise.next());
+        let own = self.dense.own(noise, k);
         if k > 0 {
             let mut keyframe = self.smoother.spare.pop().unwrap();
             let point = self.smoother.window[0].point;
@@ -92,32 +77,10 @@ impl Problem {
             let len = self.smoother.window.len();
             self.smoother.landmarks.as_mut().unwrap().coupling.append(len);
             self.smoother.window.push_back(keyframe);
-            let back = random(noise) * 0.3 + SMatrix::identity();
-            let offset = SVector::<f64, N>::from_fn(|_, _| noise.next());
-            let root = random(noise);
-            let covariance = root * root.transpose() + SMatrix::identity() * 0.1;
-            self.smoother.window[k].link = Link {
-                back: square(&back),
-                offset: offset.into(),
-                noise: square(&covariance),
-                information: Information::none(),
-            };
-            let mut rows = DMatrix::zeros(N, 2 * N);
-            rows.view_mut((0, 0), (N, N)).fill_with_identity();
-            rows.view_mut((0, N), (N, N)).copy_from(&-back);
-            let weighted = rows.transpose() * covariance.try_inverse().unwrap();
-            let at = (k - 1) * N;
-            let mut view = self.matrix.view_mut((at, at), (2 * N, 2 * N));
-            view += &weighted * &rows;
-            let mut view = self.vector.rows_mut(at, 2 * N);
-            view += &weighted * offset;
+            self.smoother.window[k].link = self.dense.link(noise, k, 1.0);
         }
         self.smoother.window[k].prior = None;
-        self.smoother.window[k].own = Information { matrix: square(&known), vector: vector.into() };
-        let mut view = self.matrix.view_mut((k * N, k * N), (N, N));
-        view += known;
-        let mut view = self.vector.rows_mut(k * N, N);
-        view += vector;
+        self.smoother.window[k].own = own;
     }
 
     /// A landmark with a prior that some of the keyframes see. Its observations are added one by one or at once, or
@@ -129,7 +92,7 @@ impl Problem {
         let index = landmarks.begin(number as u64, Some((mean, 2.0))).unwrap();
         let weight = 0.25;
         for i in 0..3 {
-            self.matrix[(at + i, at + i)] += weight;
+            self.dense.matrix[(at + i, at + i)] += weight;
         }
         let landmark = &mut landmarks.all[index];
         // Some are lost, some still tracked.
@@ -165,12 +128,12 @@ impl Problem {
                 landmark.add_to(&mut landmarks.coupling, &mut rows, 1.0);
             }
             // The same rows, for keyframe and landmark.
-            let mut dense = DMatrix::zeros(2, self.matrix.ncols());
+            let mut dense = DMatrix::zeros(2, self.dense.vector.len());
             dense.view_mut((0, k * N + POSITION), (2, 3)).copy_from(&-jacobian);
             dense.view_mut((0, k * N + ROTATION), (2, 3)).copy_from(&(jacobian * sight.arm.cross_matrix()));
             dense.view_mut((0, at), (2, 3)).copy_from(&jacobian);
-            self.matrix += dense.transpose() * &dense * sight.weight;
-            self.vector += dense.transpose() * sight.residual * sight.weight;
+            let residual = DVector::from_column_slice(sight.residual.as_slice());
+            self.dense.observe(0, &dense, &(DMatrix::identity(2, 2) * sight.weight), &residual);
         }
     }
 
@@ -182,26 +145,17 @@ impl Problem {
         let (before, keyframe) = (&self.smoother.window[k - 1], &self.smoother.window[k]);
         let mut rows = Rows::new();
         keyframe.rows::<Navigation>(&pose.into(), Some(before), &mut rows).unwrap();
-        let mut dense = DMatrix::zeros(rows.count, self.matrix.ncols());
-        for i in 0..rows.count {
-            for j in 0..N {
-                dense[(i, (k - 1) * N + j)] = rows.previous[i][j];
-                dense[(i, k * N + j)] = rows.at[i][j];
-            }
-        }
-        self.matrix += dense.transpose() * &dense;
-        self.vector += dense.transpose() * DVector::from_row_slice(&rows.residual[..rows.count]);
+        let [before, here] = [rows.previous, rows.at].map(|rows| matrix(&rows).fixed_rows::<6>(0).into_owned());
+        assert_eq!(rows.count, 6);
+        self.dense.pair(
+            k,
+            &before,
+            &here,
+            &SMatrix::identity(),
+            &matrix(&[rows.residual]).transpose().fixed_rows::<6>(0).into(),
+        );
         self.smoother.add(&mut open(), k as u64, pose).unwrap();
     }
-}
-
-fn agrees(numbers: impl Iterator<Item = (f64, f64)>, within: f64, what: &str) -> Result<(), TestCaseError> {
-    let pairs: Vec<_> = numbers.collect();
-    let scale = pairs.iter().map(|(_, batch)| batch.abs()).fold(0.0, f64::max);
-    for (here, batch) in pairs {
-        prop_assert!((here - batch).abs() <= within * scale, "{what}: {here}, not {batch} (of {scale})");
-    }
-    Ok(())
 }
 
 /// Compares every correction and covariance of the window, and every landmark.
@@ -214,12 +168,9 @@ fn compare(
     smoother.eliminate(usize::MAX);
     smoother.solve_all();
     for index in 0..smoother.window.len() {
-        let at = (index + left) * N;
-        let mean = smoother.window[index].correction;
-        agrees((0..N).map(|i| (mean[i], solution[at + i])), *within, "mean")?;
         let known = smoother.covariance_now(index).unwrap();
-        let entries = (0..N * N).map(|e| (e / N, e % N));
-        agrees(entries.map(|(i, j)| (known[i][j], covariance[(at + i, at + j)])), *within, "covariance")?;
+        let mean = smoother.window[index].correction;
+        agrees_at((&mean, &known), (solution, covariance), (index + left) * N, *within)?;
     }
     let landmarks = smoother.landmarks.as_ref().unwrap();
     for landmark in landmarks.all.iter().filter(|landmark| landmark.slot.is_some() || !landmark.sights.is_empty()) {
@@ -295,8 +246,8 @@ laws! {
         problem.smoother.eliminate(usize::MAX);
         problem.smoother.window[4].own.vector[2] += 1.0;
         problem.smoother.window[4].own.matrix[2][2] += 1.0;
-        problem.vector[4 * N + 2] += 1.0;
-        problem.matrix[(4 * N + 2, 4 * N + 2)] += 1.0;
+        problem.dense.vector[4 * N + 2] += 1.0;
+        problem.dense.matrix[(4 * N + 2, 4 * N + 2)] += 1.0;
         problem.smoother.dirty = 4;
         prop_assert_eq!(problem.smoother.eliminate(usize::MAX), 1);
         let (_, solution, within) = problem.batch();
@@ -304,10 +255,4 @@ laws! {
         let mean = problem.smoother.window[0].correction;
         agrees((0..N).map(|i| (mean[i], solution[i])), within, "mean")?;
     }
-}
-
-#[test]
-fn rows_have_a_place_for_each_error_of_a_pose() {
-    let places: Vec<usize> = (0..POSE).map(super::super::coupling::place).collect();
-    assert_eq!(places, [POSITION, POSITION + 1, POSITION + 2, ROTATION, ROTATION + 1, ROTATION + 2]);
 }

@@ -3,8 +3,8 @@
 use bb_tests::laws;
 use proptest::prelude::*;
 
-use super::flight::{Flight, N, Smoother, linear, open, sensors};
-use super::scenery::{Scenery, camera, exact};
+use super::flight::{Flight, N, Smoother, linear, open, usual};
+use super::scenery::{Scenery, exact, seeing};
 use crate::navigation::{
     GnssPosition, Kernel, LandmarkParams, NavigationFactor, Refusal, RelativePose, SmootherParams,
 };
@@ -34,34 +34,19 @@ fn both(smoother: &mut Smoother) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Effect of a relative pose on the link between its keyframes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
-    /// Relative pose that adds information.
-    Adds,
-    /// Relative pose whose weight changes with each update.
-    Robust,
-}
-
-const WAYS: [Way; 2] = [Way::Adds, Way::Robust];
-
-impl Way {
-    /// Adds a relative pose at keyframe `id` that is more precise than the one of the flight, and some of its deviations off.
-    fn add(self, smoother: &mut Smoother, flight: &Flight, id: usize) {
-        let Some(NavigationFactor::RelativePose(pose)) = flight.measured[id].first().copied() else { panic!() };
-        let off = if self == Self::Adds { 0.01 } else { 0.3 };
-        let pose = RelativePose {
-            translation: pose.translation + Vector3::new(off, -off, off),
-            translation_covariance: pose.translation_covariance * 0.04,
-            ..pose
-        };
-        let id = id as u64;
-        let result = match self {
-            Self::Adds => smoother.add(&mut open(), id, pose),
-            Self::Robust => smoother.add_robust(&mut open(), id, pose, Kernel::Huber(1.345)),
-        };
-        assert!(matches!(result, Ok(_) | Err(Refusal::Gate { .. } | Refusal::Full { .. })), "{id}: {result:?}");
-    }
+/// Adds a relative pose at keyframe `id` that is more precise than the one of the flight, and some of its deviations off. The weight of
+/// a robust one changes with each update.
+fn add_pose(smoother: &mut Smoother, flight: &Flight, id: usize, is_robust: bool) {
+    let Some(NavigationFactor::RelativePose(pose)) = flight.measured[id].first().copied() else { panic!() };
+    let off = if is_robust { 0.3 } else { 0.01 };
+    let pose = RelativePose {
+        translation: pose.translation + Vector3::new(off, -off, off),
+        translation_covariance: pose.translation_covariance * 0.04,
+        ..pose
+    };
+    let kernel = if is_robust { Kernel::Huber(1.345) } else { Kernel::Squares };
+    let result = smoother.add_robust(&mut open(), id as u64, pose, kernel);
+    assert!(matches!(result, Ok(_) | Err(Refusal::Gate { .. } | Refusal::Full { .. })), "{id}: {result:?}");
 }
 
 /// Keyframes stay where they were linearised first, but weights of kernels change.
@@ -78,12 +63,10 @@ fn in_the_usual_order_only_the_newest_is_eliminated() {
     for window in [12, 2 * LONGEST + 12] {
         let flight = Flight::new(5, 60, 1.0);
         let scenery = Scenery::new(&flight, 5, 8, LONGEST, Some(5.0));
-        let mut smoother = Smoother::new(weighing(window)).unwrap();
-        smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
-        smoother.start(0, &flight.start).unwrap();
+        let landmarks = LandmarkParams { relinearise: 1.0, ..exact() };
+        let mut smoother = seeing(&flight, weighing(window), landmarks);
         for k in 1..60 {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
+            flight.advance(&mut smoother, k);
             assert_eq!(smoother.eliminate(usize::MAX), 1, "{k}");
             scenery.observe(&mut smoother, k);
             smoother.update().unwrap();
@@ -113,12 +96,9 @@ laws! {
     ) {
         let flight = Flight::new(seed, 40, 1.0);
         let scenery = Scenery::new(&flight, seed, 6, longest, Some(5.0));
-        let params = SmootherParams { sensors: sensors(), window, ..SmootherParams::default() };
-        let params = if is_linear { weighing(window) } else { params };
-        let mut smoother = Smoother::new(params).unwrap();
+        let params = if is_linear { weighing(window) } else { usual(window) };
         let landmarks = if is_linear { LandmarkParams { relinearise: 1.0, ..exact() } } else { exact() };
-        smoother.set_camera(camera(), landmarks).unwrap();
-        smoother.start(0, &flight.start).unwrap();
+        let mut smoother = seeing(&flight, params, landmarks);
         let mut waiting = Vec::new();
         for k in 1..40 {
             flight.fly_to(&mut smoother, k);
@@ -126,7 +106,7 @@ laws! {
             let pose = |smoother: &mut Smoother, now: usize| {
                 for (_, back, _, way) in poses.iter().filter(|(at, _, moment, _)| (*at, *moment) == (k, now)) {
                     if *back < (window - 1).min(k) {
-                        WAYS[*way].add(smoother, &flight, k - back);
+                        add_pose(smoother, &flight, k - back, *way == 1);
                     }
                 }
             };

@@ -1,10 +1,12 @@
 //! Landmarks below a simulated flight, and their observations by a camera.
 
+use core::ops::Range;
+
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 
-use super::flight::{Flight, Smoother};
+use super::flight::{Flight, Smoother, open};
 use crate::navigation::noise::Noise;
-use crate::navigation::{Camera, Kernel, LandmarkParams, Observation, Refusal};
+use crate::navigation::{Camera, Kernel, LandmarkParams, Observation, Refusal, SmootherParams, Stream};
 
 /// The deviation of a pixel.
 pub(super) const PIXEL: f64 = 1.0;
@@ -74,29 +76,45 @@ impl Scenery {
     pub(super) fn observe(&self, smoother: &mut Smoother, k: usize) {
         for observation in &self.seen[k] {
             // Occasionally the directions do not intersect within their noise, or only behind a camera.
-            match smoother.observe(&mut super::flight::open(), k as u64, observation) {
+            match smoother.observe(&mut open(), k as u64, observation) {
                 Ok(_) | Err(Refusal::NotObservable) => {}
                 Err(refusal) => panic!("{k}: {refusal}"),
             }
         }
     }
 
-    /// Flies the whole flight with landmarks, with an update at each keyframe.
-    pub(super) fn flown(&self, flight: &Flight, mut smoother: Smoother, params: LandmarkParams) -> Smoother {
-        smoother.set_camera(camera(), params).unwrap();
-        self.carried(flight, smoother)
+    /// Adds the observations at keyframe k to a stream, also if it refuses some.
+    pub(super) fn observe_in(&self, stream: &mut Stream, smoother: &mut Smoother, k: usize) {
+        for observation in &self.seen[k] {
+            let _ = smoother.observe(stream, k as u64, observation);
+        }
     }
 
-    /// Flies the whole flight with landmarks and a camera that is set already.
-    pub(super) fn carried(&self, flight: &Flight, mut smoother: Smoother) -> Smoother {
-        smoother.start(0, &flight.start).unwrap();
-        self.observe(&mut smoother, 0);
-        for k in 1..flight.samples.len() {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
-            self.observe(&mut smoother, k);
-            smoother.update().unwrap();
-        }
+    /// Flies the whole flight with landmarks, with an update at each keyframe.
+    pub(super) fn flown(&self, flight: &Flight, params: SmootherParams, landmarks: LandmarkParams) -> Smoother {
+        let mut smoother = seeing(flight, params, landmarks);
+        self.fly(flight, &mut smoother, 0..flight.samples.len());
         smoother
     }
+
+    /// Flies through some keyframes, with an update at each.
+    pub(super) fn fly(&self, flight: &Flight, smoother: &mut Smoother, keyframes: Range<usize>) {
+        for k in keyframes {
+            if k > 0 {
+                flight.advance(smoother, k);
+            }
+            self.observe(smoother, k);
+            if k > 0 {
+                smoother.update().unwrap();
+            }
+        }
+    }
+}
+
+/// A smoother with a camera at the start of the flight.
+pub(super) fn seeing(flight: &Flight, params: SmootherParams, landmarks: LandmarkParams) -> Smoother {
+    let mut smoother = Smoother::new(params).unwrap();
+    smoother.set_camera(camera(), landmarks).unwrap();
+    smoother.start(0, &flight.start).unwrap();
+    smoother
 }

@@ -6,8 +6,8 @@ use proptest::prelude::*;
 
 use super::super::keyframe::Keyframe;
 use super::super::landmark::Sight;
-use super::flight::{Drone, Flight, N, Smoother, apart, converged, linear, open, sensors};
-use super::scenery::{Scenery, camera, exact};
+use super::flight::{Drone, Flight, N, agree, converged, derivative, linear, open, usual, variances_differ};
+use super::scenery::{Scenery, camera, exact, seeing};
 use crate::navigation::{LandmarkParams, NavigationFactor, Observation, SmootherParams, Stream};
 
 laws! {
@@ -19,8 +19,7 @@ laws! {
         seed in any::<u64>(), u in 20.0..730.0_f64, v in 20.0..460.0_f64, depth in 5.0..80.0_f64,
     ) {
         let flight = Flight::new(seed, 2, 1.0);
-        let mut smoother = Smoother::new(linear(5)).unwrap();
-        smoother.start(0, &flight.start).unwrap();
+        let smoother = flight.begun(linear(5));
         let keyframe = &smoother.window[0];
         let camera = camera();
         let (camera_from_world, centre) = camera.placed(&keyframe.point.position, &keyframe.point.world_from_body);
@@ -35,22 +34,19 @@ laws! {
         let residual = |keyframe: &Keyframe<NavigationFactor, N>, point: &Vector3<f64>| {
             sight.estimated::<_, Drone, N>(&camera, keyframe, point).unwrap().1
         };
-        let step = 1e-5;
-        for error in 0..N {
+        // The residual falls by the part that an error explains.
+        let by_pose = derivative::<2, N>(1e-5, |error| {
+            let mut keyframe = keyframe.clone();
+            keyframe.correction = (*error).into();
+            -residual(&keyframe, &point)
+        });
+        for (error, numeric) in by_pose.column_iter().enumerate() {
             let expected = sight.jacobian * sight.moved(&SVector::<f64, N>::ith(error, 1.0).into());
-            let [ahead, back] = [step, -step].map(|step| {
-                let mut keyframe = keyframe.clone();
-                keyframe.correction[error] = step;
-                residual(&keyframe, &point)
-            });
-            // The residual falls by the part that an error explains.
-            let numeric = (back - ahead) / (2.0 * step);
             prop_assert!((numeric - expected).norm() < 1e-5 * (1.0 + expected.norm()), "{error}: {numeric} {expected}");
         }
-        for axis in 0..3 {
-            let [ahead, back] = [step, -step].map(|step| residual(keyframe, &(point + Vector3::ith(axis, step))));
-            let numeric = (back - ahead) / (2.0 * step);
-            prop_assert!((numeric - sight.jacobian.column(axis)).norm() < 1e-5 * (1.0 + numeric.norm()));
+        let by_point = derivative::<2, 3>(1e-5, |moved| -residual(keyframe, &(point + moved)));
+        for (numeric, exact) in by_point.column_iter().zip(sight.jacobian.column_iter()) {
+            prop_assert!((numeric - exact).norm() < 1e-5 * (1.0 + numeric.norm()));
         }
     }
 
@@ -68,13 +64,8 @@ laws! {
             all.filter(|seen| seen.landmark == id).find_map(|seen| seen.guess)
         };
         let arrived = |order: &[usize]| {
-            let mut smoother = Smoother::new(converged(10)).unwrap();
-            smoother.set_camera(camera(), exact()).unwrap();
-            smoother.start(0, &flight.start).unwrap();
-            for k in 1..10 {
-                flight.fly_to(&mut smoother, k);
-                flight.measure(&mut smoother, k);
-            }
+            let mut smoother = seeing(&flight, converged(10), exact());
+            (1..10).for_each(|k| flight.advance(&mut smoother, k));
             for k in order {
                 for seen in &scenery.seen[*k] {
                     let seen = Observation { guess: guessed(seen.landmark), ..*seen };
@@ -84,16 +75,8 @@ laws! {
             }
             smoother
         };
-        let mut in_order = arrived(&(0..10).collect::<Vec<_>>());
-        let mut shuffled = arrived(&order);
-        for id in 0..10 {
-            let (a, b) = (in_order.smoothed(id).unwrap(), shuffled.smoothed(id).unwrap());
-            prop_assert!(apart(&a, &b) < 1e-6, "{id}: {}", apart(&a, &b));
-            let (a, b) = (in_order.smoothed_covariance(id).unwrap(), shuffled.smoothed_covariance(id).unwrap());
-            for i in 0..N {
-                prop_assert!((a[(i, i)] / b[(i, i)] - 1.0).abs() < 1e-5, "{id}, {i}");
-            }
-        }
+        let in_order = arrived(&(0..10).collect::<Vec<_>>());
+        agree(&in_order, &arrived(&order), (1e-6, 1e-5), variances_differ)?;
     }
 
     /// Without a guess, landmarks give no information on the origin and heading of the world, however often they are
@@ -107,15 +90,10 @@ laws! {
         flight.start.velocity_covariance *= 1e6;
         let scenery = Scenery::new(&flight, seed, 8, 100, None);
         let params = SmootherParams { relinearise_rotation: 1e-3, iterations: 2, ..linear(8) };
-        let mut smoother = Smoother::new(params).unwrap();
-        smoother.set_camera(camera(), LandmarkParams::default()).unwrap();
-        smoother.start(0, &flight.start).unwrap();
+        let mut smoother = seeing(&flight, params, LandmarkParams::default());
         for k in 1..60 {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
-            for seen in &scenery.seen[k] {
-                let _ = smoother.observe(&mut open(), k as u64, seen);
-            }
+            flight.advance(&mut smoother, k);
+            scenery.observe_in(&mut open(), &mut smoother, k);
             smoother.update().unwrap();
             let covariance = smoother.covariance().unwrap();
             prop_assert!(covariance[(8, 8)] >= 0.05 * 0.05 * (1.0 - 1e-3), "{k}: {}", covariance[(8, 8)]);
@@ -134,7 +112,7 @@ laws! {
     ) {
         let flight = Flight::new(seed, 8, 1.0);
         let scenery = Scenery::new(&flight, seed, 4, 5, None);
-        let mut smoother = scenery.flown(&flight, Smoother::new(linear(6)).unwrap(), LandmarkParams::default());
+        let mut smoother = scenery.flown(&flight, linear(6), LandmarkParams::default());
         let mut stream = Stream::default();
         for part in numbers.chunks(7) {
             let guess = (part[6] > 100.0).then(|| (Vector3::new(part[2], part[3], part[4]), part[5]));
@@ -164,9 +142,8 @@ fn heading_and_origin() {
     for seen in there.seen.iter_mut().flatten() {
         seen.guess = seen.guess.map(|(known, deviation)| (place(&known), deviation));
     }
-    let params = SmootherParams { sensors: sensors(), window: 10, ..SmootherParams::default() };
-    let here = scenery.flown(&flight, Smoother::new(params).unwrap(), LandmarkParams::default());
-    let there = there.flown(&other, Smoother::new(params).unwrap(), LandmarkParams::default());
+    let here = scenery.flown(&flight, usual(10), LandmarkParams::default());
+    let there = there.flown(&other, usual(10), LandmarkParams::default());
     let (here, there) = (here.estimate().unwrap(), there.estimate().unwrap());
     let apart = (place(&here.position) - there.position).norm();
     let turned = (turn * here.world_from_body).angle_to(&there.world_from_body);

@@ -3,17 +3,17 @@
 use bb_tests::laws;
 use proptest::prelude::*;
 
-use super::flight::{Flight, N, Smoother, apart, linear, sensors};
-use super::scenery::{Scenery, camera, exact};
-use crate::navigation::{LandmarkParams, NAVIGATION, SmootherParams, Stream, nees};
+use super::flight::{Flight, Smoother, agree, apart, linear, open, usual, variances_differ};
+use super::scenery::{Scenery, exact, seeing};
+use crate::navigation::{LandmarkParams, NAVIGATION, Stream};
 
-/// A smoother that carries on every track, and in which every landmark keeps its first linearisation point, however far it moves: the
-/// point of one that has outlived the window can no longer change, so in the batch it must not either.
-fn carrying(window: usize) -> Smoother {
-    let mut smoother = Smoother::new(linear(window)).unwrap();
-    smoother.set_camera(camera(), exact()).unwrap();
+/// A flight with a smoother that carries on every track, and in which every landmark keeps its first linearisation point, however far it
+/// moves: the point of one that has outlived the window can no longer change, so in the batch it must not either.
+fn carried(scenery: &Scenery, flight: &Flight, window: usize) -> Smoother {
+    let mut smoother = seeing(flight, linear(window), exact());
     let landmarks = smoother.landmarks.as_mut().unwrap();
     (landmarks.known_within, landmarks.params.relinearise) = (f64::INFINITY, f64::INFINITY);
+    scenery.fly(flight, &mut smoother, 0..30);
     smoother
 }
 
@@ -25,44 +25,39 @@ laws! {
     fn a_window_is_the_batch(seed in any::<u64>(), window in 6_usize..12, longest in 2_usize..40) {
         let flight = Flight::new(seed, 30, 1.0);
         let scenery = Scenery::new(&flight, seed, 6, longest, Some(5.0));
-        let mut batch = scenery.carried(&flight, carrying(30));
-        let mut here = scenery.carried(&flight, carrying(window));
+        let (mut batch, here) = (carried(&scenery, &flight, 30), carried(&scenery, &flight, window));
         // A flight whose first linearisation points do not do, one in a thousand, diverges and amplifies even rounding.
         let off = |id: u64| (batch.smoothed(id).unwrap().position - flight.truth[id as usize].position).norm();
         prop_assume!((0..30).map(off).fold(0.0, f64::max) < 5.0);
-        for id in here.keyframes().collect::<Vec<_>>() {
-            let (all, some) = (batch.smoothed(id).unwrap(), here.smoothed(id).unwrap());
-            prop_assert!(apart(&all, &some) < 1e-9, "{id}: {}", apart(&all, &some));
-            let (all, some) = (batch.smoothed_covariance(id).unwrap(), here.smoothed_covariance(id).unwrap());
-            for i in 0..N {
-                prop_assert!((all[(i, i)] / some[(i, i)] - 1.0).abs() < 1e-9, "{id}, {i}");
-            }
-        }
+        agree(&here, &batch, (1e-9, 1e-9), variances_differ)?;
     }
 }
 
-/// Errors are as large as the smoother says if the sensors err exactly as it assumes, also with tracks that outlive the
-/// window.
+/// Checks normalised errors of flights with the sensors that the smoother assumes.
+fn are_as_large_as_it_says<const M: usize>(flights: u32, which: [&str; M], nees: impl Fn(u64) -> [f64; M]) {
+    let all: Vec<_> = (1..=u64::from(flights)).map(nees).collect();
+    // Three standard deviations of the mean of a χ² variable with this many degrees of freedom.
+    let dimension = NAVIGATION as f64;
+    let spread = 3.0 * (2.0 * dimension / f64::from(flights)).sqrt();
+    for (i, which) in which.into_iter().enumerate() {
+        let mean = all.iter().map(|of_flight| of_flight[i]).sum::<f64>() / f64::from(flights);
+        assert!((mean - dimension).abs() < spread, "{which}: NEES {mean}, not {dimension} ± {spread}");
+    }
+}
+
+/// Errors are as large as the smoother says at the newest keyframe and at the oldest, and with tracks that outlive the window.
 #[test]
 fn errors_are_as_large_as_the_smoother_says() {
-    const FLIGHTS: u32 = 40;
-    const KEYFRAMES: usize = 60;
-    for guess in [None, Some(5.0)] {
-        let params = SmootherParams { sensors: sensors(), window: 8, ..SmootherParams::default() };
-        let mut sum = 0.0;
-        for seed in 1..=u64::from(FLIGHTS) {
-            let flight = Flight::new(seed, KEYFRAMES, 1.0);
-            let scenery = Scenery::new(&flight, seed, 10, 100, guess);
-            let smoother = scenery.flown(&flight, Smoother::new(params).unwrap(), exact());
-            let covariance = smoother.covariance().unwrap();
-            let of_navigation = covariance.fixed_view::<NAVIGATION, NAVIGATION>(0, 0).into_owned();
-            let error = flight.error(KEYFRAMES - 1, &smoother.estimate().unwrap());
-            sum += nees(&error, &of_navigation).unwrap() / f64::from(FLIGHTS);
-        }
-        let dimension = NAVIGATION as f64;
-        let spread = 3.0 * (2.0 * dimension / f64::from(FLIGHTS)).sqrt();
-        assert!((sum - dimension).abs() < spread, "{guess:?}: NEES {sum}, not {dimension} ± {spread}");
-    }
+    are_as_large_as_it_says(100, ["newest", "oldest"], |seed| {
+        let flight = Flight::new(seed, 120, 1.0);
+        let smoother = flight.flown(usual(10));
+        [119, 110].map(|k| flight.nees(k, &smoother))
+    });
+    are_as_large_as_it_says(40, ["landmarks", "landmarks with a guess"], |seed| {
+        let flight = Flight::new(seed, 60, 1.0);
+        let scenery = |guess| Scenery::new(&flight, seed, 10, 100, guess);
+        [None, Some(5.0)].map(|guess| flight.nees(59, &scenery(guess).flown(&flight, usual(8), exact())))
+    });
 }
 
 /// Lost landmarks are eventually removed, and landmarks that outlive the window continue.
@@ -70,17 +65,11 @@ fn errors_are_as_large_as_the_smoother_says() {
 fn landmarks_come_and_go() {
     let flight = Flight::new(17, 150, 1.0);
     let scenery = Scenery::new(&flight, 17, 10, 25, None);
-    let mut smoother =
-        Smoother::new(SmootherParams { sensors: sensors(), window: 8, ..SmootherParams::default() }).unwrap();
-    smoother.set_camera(camera(), LandmarkParams { landmarks: 60, ..LandmarkParams::default() }).unwrap();
-    smoother.start(0, &flight.start).unwrap();
+    let mut smoother = seeing(&flight, usual(8), LandmarkParams { landmarks: 60, ..LandmarkParams::default() });
     let (mut stream, mut most) = (Stream::default(), 0);
     for k in 1..150 {
-        flight.fly_to(&mut smoother, k);
-        flight.measure(&mut smoother, k);
-        for seen in &scenery.seen[k] {
-            let _ = smoother.observe(&mut stream, k as u64, seen);
-        }
+        flight.advance(&mut smoother, k);
+        scenery.observe_in(&mut stream, &mut smoother, k);
         smoother.update().unwrap();
         most = most.max(smoother.landmarks().0);
     }
@@ -96,17 +85,13 @@ fn landmarks_come_and_go() {
 fn room_is_freed_after_a_restart() {
     let flight = Flight::new(17, 60, 1.0);
     let scenery = Scenery::new(&flight, 17, 10, 25, Some(5.0));
-    let params = SmootherParams { sensors: sensors(), window: 6, ..SmootherParams::default() };
-    let mut smoother = scenery.flown(&flight, Smoother::new(params).unwrap(), exact());
+    let mut smoother = scenery.flown(&flight, usual(6), exact());
     assert!(smoother.landmarks.as_ref().unwrap().coupling.points() > 0, "none outlives the window");
     smoother.start(0, &flight.start).unwrap();
     for k in 1..30 {
-        flight.fly_to(&mut smoother, k);
-        flight.measure(&mut smoother, k);
+        flight.advance(&mut smoother, k);
         if k < 4 {
-            for seen in &scenery.seen[k] {
-                let _ = smoother.observe(&mut super::flight::open(), k as u64, seen);
-            }
+            scenery.observe_in(&mut open(), &mut smoother, k);
         }
         smoother.update().unwrap();
     }
@@ -119,36 +104,19 @@ fn another_camera_may_be_set_in_flight() {
     let flight = Flight::new(29, 40, 1.0);
     for (longest, guess) in [(100, None), (4, Some(5.0))] {
         let scenery = Scenery::new(&flight, 29, 10, longest, guess);
-        let params = SmootherParams { window: 8, ..linear(8) };
-        let mut smoother = Smoother::new(params).unwrap();
-        smoother.set_camera(camera(), LandmarkParams::default()).unwrap();
-        smoother.start(0, &flight.start).unwrap();
-        for k in 1..30 {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
-            scenery.observe(&mut smoother, k);
-            smoother.update().unwrap();
-        }
+        let mut smoother = seeing(&flight, linear(8), LandmarkParams::default());
+        scenery.fly(&flight, &mut smoother, 1..30);
         let (estimate, covariance) = (smoother.estimate().unwrap(), smoother.covariance().unwrap());
-        smoother.set_camera(camera(), LandmarkParams::default()).unwrap();
+        smoother.set_camera(super::scenery::camera(), LandmarkParams::default()).unwrap();
         smoother.update().unwrap();
         assert!(apart(&estimate, &smoother.estimate().unwrap()) < 1e-9);
-        let after = smoother.covariance().unwrap();
-        for i in 0..N {
-            assert!((after[(i, i)] / covariance[(i, i)] - 1.0).abs() < 1e-6, "{i}");
-        }
+        assert!(variances_differ(&smoother.covariance().unwrap(), &covariance) < 1e-6);
         assert_eq!(smoother.landmarks(), (0, 0));
         // It goes on, with another window.
-        for k in 30..40 {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
-            scenery.observe(&mut smoother, k);
-            smoother.update().unwrap();
-        }
+        scenery.fly(&flight, &mut smoother, 30..40);
         assert!(smoother.landmarks().1 > 3);
-        let covariance = smoother.covariance().unwrap().fixed_view::<NAVIGATION, NAVIGATION>(0, 0).into_owned();
-        let off = nees(&flight.error(39, &smoother.estimate().unwrap()), &covariance).unwrap();
         // 99.9 % of a χ² variable with 15 degrees of freedom.
+        let off = flight.nees(39, &smoother);
         assert!(off < 37.7, "{off}");
     }
 }

@@ -3,31 +3,24 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::flight::{Drone, Flight, Smoother, apart, linear, open, sensors};
-use super::scenery::{PIXEL, Scenery, camera};
+use super::scenery::{PIXEL, Scenery, camera, seeing};
 use crate::navigation::{LandmarkParams, Observation, Refusal, Sighted, SmootherParams, Stream};
 
-/// A flight with its last keyframe in the window, and landmarks in use.
-fn flown() -> (Flight, Scenery, Smoother) {
+/// A smoother in flight with its last keyframe in the window, and landmarks in use.
+fn flown() -> (Scenery, Smoother) {
     let flight = Flight::new(11, 12, 0.0);
     let scenery = Scenery::new(&flight, 11, 8, 100, Some(5.0));
     let params = LandmarkParams { landmarks: 40, ..LandmarkParams::default() };
-    let mut smoother = Smoother::new(linear(20)).unwrap();
-    smoother.set_camera(camera(), params).unwrap();
-    smoother.start(0, &flight.start).unwrap();
-    for k in 1..12 {
-        flight.fly_to(&mut smoother, k);
-        flight.measure(&mut smoother, k);
-        if k < 11 {
-            scenery.observe(&mut smoother, k);
-        }
-        smoother.update().unwrap();
-    }
-    (flight, scenery, smoother)
+    let mut smoother = seeing(&flight, linear(20), params);
+    scenery.fly(&flight, &mut smoother, 1..11);
+    flight.advance(&mut smoother, 11);
+    smoother.update().unwrap();
+    (scenery, smoother)
 }
 
 #[test]
 fn refusals_are_named_and_counted() {
-    let (_, scenery, mut smoother) = flown();
+    let (scenery, mut smoother) = flown();
     let mut stream = Stream::default();
     let good = scenery.seen[11][0];
     let before = smoother.estimate().unwrap();
@@ -36,21 +29,27 @@ fn refusals_are_named_and_counted() {
         deviation_px,
         ..good
     };
+    let new = Observation::new(9999, Vector2::new(5.0, 5.0), 1.0);
+    let guessed = |scale: f64, deviation: f64| Observation {
+        guess: Some((Vector3::new(0.0, 0.0, 1e4) * scale, deviation)),
+        ..new
+    };
+    for (seen, refusal) in [
+        (with((f64::NAN, 1.0), 1.0), Refusal::NonFinite),
+        (with((1.0, 1e9), 1.0), Refusal::OutOfRange),
+        (with((-3.0, 1.0), 1.0), Refusal::OutOfRange),
+        (with((1.0, 1.0), 0.0), Refusal::Noise),
+        (with((1.0, 1.0), 9e-4), Refusal::Noise),
+        (with((1.0, 1.0), f64::NAN), Refusal::NonFinite),
+        (guessed(1.0, 1.0), Refusal::NotObservable),
+        (guessed(1.0, 0.0), Refusal::Noise),
+        (guessed(1.0, 9e-4), Refusal::Noise),
+        (guessed(f64::NAN, 1.0), Refusal::NonFinite),
+        (guessed(1e6, 1.0), Refusal::OutOfRange),
+    ] {
+        assert_eq!(smoother.observe(&mut stream, 11, &seen), Err(refusal), "{seen:?}");
+    }
     let mut refused = |seen: Observation| smoother.observe(&mut stream, 11, &seen);
-    assert_eq!(refused(with((f64::NAN, 1.0), 1.0)), Err(Refusal::NonFinite));
-    assert_eq!(refused(with((1.0, 1e9), 1.0)), Err(Refusal::OutOfRange));
-    assert_eq!(refused(with((-3.0, 1.0), 1.0)), Err(Refusal::OutOfRange));
-    assert_eq!(refused(with((1.0, 1.0), 0.0)), Err(Refusal::Noise));
-    assert_eq!(refused(with((1.0, 1.0), 9e-4)), Err(Refusal::Noise));
-    assert_eq!(refused(with((1.0, 1.0), f64::NAN)), Err(Refusal::NonFinite));
-    let (above, deviation) = (Vector3::new(0.0, 0.0, 1e4), 1.0);
-    let new =
-        Observation { guess: Some((above, deviation)), ..Observation::new(9999, Vector2::new(5.0, 5.0), 1.0) };
-    assert_eq!(refused(new), Err(Refusal::NotObservable), "behind the camera");
-    assert_eq!(refused(Observation { guess: Some((above, 0.0)), ..new }), Err(Refusal::Noise));
-    assert_eq!(refused(Observation { guess: Some((above, 9e-4)), ..new }), Err(Refusal::Noise));
-    assert_eq!(refused(Observation { guess: Some((above * f64::NAN, 1.0)), ..new }), Err(Refusal::NonFinite));
-    assert_eq!(refused(Observation { guess: Some((above * 1e6, 1.0)), ..new }), Err(Refusal::OutOfRange));
     assert!(matches!(refused(with((5.0, 5.0), 1.0)), Err(Refusal::Gate { .. })), "a wrong match");
     assert!(matches!(refused(good), Ok(Sighted::Used(_))));
     assert_eq!(refused(good), Err(Refusal::Repeated { landmark: good.landmark }));
@@ -74,7 +73,7 @@ fn refusals_are_named_and_counted() {
 /// A landmark with a wrong guess, above the camera, is restarted instead of kept until it leaves the window.
 #[test]
 fn a_landmark_behind_the_camera_begins_again() {
-    let (_, scenery, mut smoother) = flown();
+    let (scenery, mut smoother) = flown();
     let good = scenery.seen[11][0];
     let landmarks = smoother.landmarks.as_mut().unwrap();
     landmarks.begin(9999, Some((Vector3::new(0.0, 0.0, 1e4), 1.0))).unwrap();
@@ -91,7 +90,7 @@ fn a_landmark_behind_the_camera_begins_again() {
 /// A landmark without any information is not treated as exactly known: it waits until it is determined.
 #[test]
 fn an_indeterminate_landmark_waits() {
-    let (_, scenery, mut smoother) = flown();
+    let (scenery, mut smoother) = flown();
     let good = scenery.seen[11][0];
     let place = scenery.places[good.landmark as usize];
     let landmarks = smoother.landmarks.as_mut().unwrap();
@@ -115,16 +114,15 @@ fn an_id_is_reused() {
             seen.landmark = ids[1 - which];
         }
     }
-    let mut smoother = Smoother::new(SmootherParams { sensors: sensors(), ..SmootherParams::default() }).unwrap();
-    smoother.set_camera(camera(), LandmarkParams::default()).unwrap();
-    smoother.start(0, &flight.start).unwrap();
+    let mut smoother = seeing(
+        &flight,
+        SmootherParams { sensors: sensors(), ..SmootherParams::default() },
+        LandmarkParams::default(),
+    );
     let mut stream = Stream::default();
     for k in 1..30 {
-        flight.fly_to(&mut smoother, k);
-        flight.measure(&mut smoother, k);
-        for seen in &scenery.seen[k] {
-            let _ = smoother.observe(&mut stream, k as u64, seen);
-        }
+        flight.advance(&mut smoother, k);
+        scenery.observe_in(&mut stream, &mut smoother, k);
         smoother.update().unwrap();
     }
     assert!((4..=12).contains(&stream.counts().gate), "{:?}", stream.counts());
@@ -141,7 +139,7 @@ fn an_id_is_reused() {
 /// Without parallax, no landmark is triangulated. This is not an error, and nothing is used.
 #[test]
 fn without_parallax_landmarks_wait() {
-    let (_, _, mut smoother) = flown();
+    let (_, mut smoother) = flown();
     let mut stream = open();
     let mut waiting = 0;
     for k in 5..12 {
@@ -171,9 +169,7 @@ fn a_landmark_may_be_seen_again_after_a_while() {
         let mut flight = Flight::new(seed, LAST + 1, 1.0);
         flight.measured.iter_mut().for_each(Vec::clear);
         let scenery = Scenery::new(&flight, seed, 10, 100, Some(5.0));
-        let mut smoother = Smoother::new(linear(20)).unwrap();
-        smoother.set_camera(camera(), LandmarkParams::default()).unwrap();
-        smoother.start(0, &flight.start).unwrap();
+        let mut smoother = seeing(&flight, linear(20), LandmarkParams::default());
         scenery.observe(&mut smoother, 0);
         for k in 1..=LAST {
             flight.fly_to(&mut smoother, k);

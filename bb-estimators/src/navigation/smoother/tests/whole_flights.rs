@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector, Matrix2x3, SMatrix, SVector, Vector3};
 use super::super::landmark::{Landmark, Sight};
 use super::super::link::{Information, Link};
 use super::super::matrix::mirror;
-use super::flight::{Drone, Flight, N, Smoother, linear, open, sensors};
-use super::scenery::{Scenery, camera, exact};
+use super::flight::{Drone, Flight, N, Smoother, linear, open, usual};
+use super::scenery::{Scenery, exact, seeing};
 use crate::navigation::factor::Factor;
 use crate::navigation::factor::Rows;
 use crate::navigation::{Estimate, LandmarkParams, POSITION, ROTATION, SmootherParams};
@@ -287,14 +287,11 @@ fn flown(
 ) {
     let flight = Flight::new(seed, keyframes, 1.0);
     let scenery = Scenery::new(&flight, seed, count, 40, guess);
-    let mut smoother = Smoother::new(params).unwrap();
-    smoother.set_camera(camera(), landmarks).unwrap();
-    smoother.start(0, &flight.start).unwrap();
+    let mut smoother = seeing(&flight, params, landmarks);
     let mut record = Record::new(&smoother);
     for k in 0..keyframes {
         if k > 0 {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
+            flight.advance(&mut smoother, k);
         }
         scenery.observe(&mut smoother, k);
         smoother.update().unwrap();
@@ -326,9 +323,8 @@ fn a_window_is_the_dense_system_of_the_flight() {
 #[test]
 fn nothing_is_lost_when_all_is_relinearised() {
     for (seed, window, count) in [(5, 4, 8), (1, 5, 6), (9, 4, 6), (12, 6, 8)] {
-        let params = SmootherParams { sensors: sensors(), window, ..SmootherParams::default() };
         let landmarks = LandmarkParams { persistent: 0, ..exact() };
-        flown(seed, (14, count), None, (params, landmarks), |smoother, record, _, k| {
+        flown(seed, (14, count), None, (usual(window), landmarks), |smoother, record, _, k| {
             if k % 3 == 1 {
                 let (means, covariances) = record.solved().differences(smoother);
                 assert!(means < 1e-8 && covariances < 1e-8, "seed {seed}, keyframe {k}: {means:e} {covariances:e}");
