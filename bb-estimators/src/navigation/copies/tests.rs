@@ -6,12 +6,13 @@ use proptest::prelude::*;
 
 use super::{Copies, Ways};
 use crate::navigation::eskf::{EskfFilter, EskfParams, ImuMean, Start};
+use crate::navigation::math::wrapped;
 use crate::navigation::measurement::{BodyVelocity, GnssPosition, GnssVelocity};
 use crate::navigation::noise::Noise;
 use crate::navigation::propagate::Propagate;
 use crate::navigation::state::{Aided, POSITION, States, Vehicle};
 use crate::navigation::stream::Stream;
-use crate::navigation::{GaussMarkov, nees};
+use crate::navigation::{Fused, GaussMarkov, Optional, Refusal, nees, offset};
 
 const STEP_NS: i64 = 20_000_000;
 const STEP_S: f64 = 0.02;
@@ -113,10 +114,6 @@ impl Car {
     }
 }
 
-fn stream() -> Stream {
-    Stream::default()
-}
-
 /// Copies that know the noise of the car's own IMU, and those of fixes and wheels.
 fn copies<S: States, const N: usize>(densities: [f64; 2], mounting: f64, noise: bool) -> Copies<EskfFilter<S, N>> {
     let params = EskfParams {
@@ -129,37 +126,77 @@ fn copies<S: States, const N: usize>(densities: [f64; 2], mounting: f64, noise: 
     Copies::new(params, Ways { noise, scale: false }).unwrap()
 }
 
+/// Copies of a filter in a car, with the stream of its fixes.
+struct Driven<S: States, const N: usize> {
+    car: Car,
+    copies: Copies<EskfFilter<S, N>>,
+    gnss: Stream,
+}
+
+impl<S: States, const N: usize> Driven<S, N> {
+    fn new(car: Car, copies: Copies<EskfFilter<S, N>>, heading_deviation: f64) -> Self {
+        let mut driven = Self { car, copies, gnss: Stream::default() };
+        driven.copies.start(&driven.car.start(heading_deviation)).unwrap();
+        driven
+    }
+
+    /// A car with a quiet IMU, whose heading is known to so many radians.
+    fn quiet(seed: u64, heading_deviation: f64) -> Self {
+        Self::new(Car::new(seed, QUIET, 0.0), copies(QUIET, 0.0, false), heading_deviation)
+    }
+
+    /// Drives for some seconds, with a step of 20 ms after each sample.
+    fn drive(&mut self, seconds: usize, mut step: impl FnMut(&mut Self, usize)) {
+        for number in 1..=50 * seconds {
+            self.copies.propagate(&self.car.drive()).unwrap();
+            step(self, number);
+        }
+    }
+
+    /// Drives for some seconds, with a step at the end of each.
+    fn by_second(&mut self, seconds: usize, mut step: impl FnMut(&mut Self, usize)) {
+        for second in 1..=seconds {
+            self.drive(1, |_, _| ());
+            step(self, second);
+        }
+    }
+
+    /// Fuses a position that is this far away.
+    fn fix(&mut self, away: &Vector3<f64>) -> Result<Fused, Refusal> {
+        let mut fix = self.car.fix();
+        fix.position += away;
+        self.copies.update_position(&mut self.gnss, &fix)
+    }
+
+    fn heading_error(&self) -> f64 {
+        let estimate = self.copies.estimate().unwrap();
+        (self.car.world_from_imu() * estimate.world_from_body.inverse()).scaled_axis().z
+    }
+}
+
+type FixedCar = Driven<Aided, { Aided::DIMENSION }>;
+type WheelsCar = Driven<Vehicle, { Vehicle::DIMENSION }>;
 type Fixed = Copies<EskfFilter<Aided, { Aided::DIMENSION }>>;
 type Wheels = Copies<EskfFilter<Vehicle, { Vehicle::DIMENSION }>>;
 
 const QUIET: [f64; 2] = [1e-3, 1e-2];
 
-fn heading_error<S: States, const N: usize>(car: &Car, copies: &Copies<EskfFilter<S, N>>) -> f64 {
-    (car.world_from_imu() * copies.estimate().unwrap().world_from_body.inverse()).scaled_axis().z
-}
-
 #[test]
 fn an_unknown_heading_is_found_with_an_honest_deviation() {
     let (mut beyond, mut known) = (0, 0);
     for seed in 0..10 {
-        let mut car = Car::new(seed, QUIET, 0.0);
-        let mut copies: Fixed = copies(QUIET, 0.0, false);
-        copies.start(&car.start(4.0)).unwrap();
-        assert_eq!(copies.starts(), 6);
-        let mut gnss = stream();
-        for step in 1..=60 * 50 {
-            copies.propagate(&car.drive()).unwrap();
-            if step % 50 != 0 {
-                continue;
-            }
-            assert!(copies.update_position(&mut gnss, &car.fix()).is_ok(), "seed {seed}, {step}");
-            if copies.heading_deviation() < 0.5 {
-                let error = heading_error(&car, &copies).abs();
+        let mut driven = FixedCar::quiet(seed, 4.0);
+        assert_eq!(driven.copies.starts(), 6);
+        driven.by_second(60, |driven, second| {
+            assert!(driven.fix(&Vector3::zeros()).is_ok(), "seed {seed}, {second} s");
+            let deviation = driven.copies.heading_deviation();
+            if deviation < 0.5 {
                 known += 1;
-                beyond += u32::from(error > 4.0 * copies.heading_deviation());
+                beyond += u32::from(driven.heading_error().abs() > 4.0 * deviation);
             }
-        }
-        assert!(heading_error(&car, &copies).abs() < 0.1, "seed {seed}");
+        });
+        let copies = &driven.copies;
+        assert!(driven.heading_error().abs() < 0.1, "seed {seed}");
         assert!(copies.starts() <= 3 && copies.heading_deviation() < 0.1, "seed {seed}: {}", copies.starts());
     }
     assert!(known > 300 && beyond == 0, "{beyond} of {known}");
@@ -168,25 +205,21 @@ fn an_unknown_heading_is_found_with_an_honest_deviation() {
 #[test]
 fn an_unknown_mounting_on_wheels_is_found_with_the_heading() {
     for (seed, yaw) in [(1, 0.0), (2, 1.6), (3, -2.4), (4, 3.1)] {
-        let mut car = Car::new(seed, QUIET, yaw);
-        let mut copies: Wheels = copies(QUIET, 4.0, false);
-        copies.start(&car.start(4.0)).unwrap();
-        assert_eq!(copies.starts(), 36);
-        let (mut gnss, mut wheels) = (stream(), stream());
-        for step in 1..=40 * 50 {
-            copies.propagate(&car.drive()).unwrap();
+        let mut driven = WheelsCar::new(Car::new(seed, QUIET, yaw), copies(QUIET, 4.0, false), 4.0);
+        assert_eq!(driven.copies.starts(), 36);
+        let mut wheels = Stream::default();
+        driven.drive(40, |driven, step| {
             if step % 5 == 0 {
-                let _ = copies.update(&mut wheels, &car.wheels());
+                let _ = driven.copies.update(&mut wheels, &driven.car.wheels());
             }
             if step % 50 == 0 {
-                let _ = copies.update_position(&mut gnss, &car.fix());
+                let _ = driven.fix(&Vector3::zeros());
             }
-        }
-        assert!(heading_error(&car, &copies).abs() < 0.05, "yaw {yaw}: {}", heading_error(&car, &copies));
-        let first = crate::navigation::offset::<Vehicle>(crate::navigation::Optional::WheelMounting).unwrap();
-        let mounting = copies.estimate().unwrap().optional[first];
-        let off = crate::navigation::math::wrapped(mounting - yaw).abs();
-        assert!(off < 0.05, "yaw {yaw}: {mounting}");
+        });
+        assert!(driven.heading_error().abs() < 0.05, "yaw {yaw}: {}", driven.heading_error());
+        let first = offset::<Vehicle>(Optional::WheelMounting).unwrap();
+        let mounting = driven.copies.estimate().unwrap().optional[first];
+        assert!(wrapped(mounting - yaw).abs() < 0.05, "yaw {yaw}: {mounting}");
     }
 }
 
@@ -195,25 +228,20 @@ fn an_unknown_mounting_on_wheels_is_found_with_the_heading() {
 fn noise_is_found_whatever_the_data_sheet_says() {
     for (seed, sheet) in [(1, 1.0), (2, 0.2), (3, 0.04)] {
         let real = [3e-3, 5e-2];
-        let mut car = Car::new(seed, real, 0.0);
-        let mut copies: Fixed = copies(real.map(|density| density * sheet), 0.0, true);
-        copies.start(&car.start(0.4)).unwrap();
-        let (mut gnss, mut sum, mut count) = (stream(), 0.0, 0.0);
-        for step in 1..=400 * 50 {
-            copies.propagate(&car.drive()).unwrap();
-            if step % 50 == 0 {
-                copies.update_position(&mut gnss, &car.fix()).unwrap();
-                if step > 200 * 50 {
-                    let error = car.position - copies.estimate().unwrap().position;
-                    let covariance = copies.best().covariance().fixed_view::<3, 3>(POSITION, POSITION).into_owned();
-                    sum += nees(&error, &covariance).unwrap();
-                    count += 1.0;
-                }
+        let copies = copies(real.map(|density| density * sheet), 0.0, true);
+        let mut driven = FixedCar::new(Car::new(seed, real, 0.0), copies, 0.4);
+        let mut sum = 0.0;
+        driven.by_second(400, |driven, second| {
+            driven.fix(&Vector3::zeros()).unwrap();
+            if second > 200 {
+                let error = driven.car.position - driven.copies.estimate().unwrap().position;
+                let covariance = driven.copies.best().covariance();
+                sum += nees(&error, &covariance.fixed_view::<3, 3>(POSITION, POSITION).into_owned()).unwrap();
             }
-        }
-        let multiple = copies.noise() * sheet;
-        assert!((0.24..=17.0).contains(&multiple), "sheet {sheet}: {}", copies.noise());
-        let mean = sum / count;
+        });
+        let noise = driven.copies.noise();
+        assert!((0.24..=17.0).contains(&(noise * sheet)), "sheet {sheet}: {noise}");
+        let mean = sum / 200.0;
         assert!((1.0..5.0).contains(&mean), "sheet {sheet}: NEES {mean}");
     }
 }
@@ -223,25 +251,22 @@ fn noise_is_found_whatever_the_data_sheet_says() {
 fn gaps_are_doubted_as_much_as_they_do_wrong() {
     let (mut beyond, mut gaps) = (0, 0);
     for seed in 0..20 {
-        let mut car = Car::new(seed, QUIET, 0.0);
-        let mut copies: Fixed = copies(QUIET, 0.0, false);
-        copies.start(&car.start(0.3)).unwrap();
-        let mut gnss = stream();
+        let mut driven = FixedCar::quiet(seed, 0.3);
         let missing = 15 + 20 * usize::try_from(seed % 4).unwrap();
         for step in 1..=120 * 50_usize {
-            let sample = car.drive();
+            let sample = driven.car.drive();
             let is_gap = step > 50 * 50 && step % (20 * 50) < missing;
             if !is_gap {
-                copies.propagate(&sample).unwrap();
+                driven.copies.propagate(&sample).unwrap();
             }
             if step > 50 * 50 && step % (20 * 50) == missing {
                 gaps += 1;
-                let deviation = copies.heading_deviation();
-                beyond += u32::from(heading_error(&car, &copies).abs() > 4.0 * deviation);
+                let deviation = driven.copies.heading_deviation();
+                beyond += u32::from(driven.heading_error().abs() > 4.0 * deviation);
                 assert!(deviation < 1.0, "{deviation}");
             }
             if step % 50 == 0 && !is_gap {
-                let _ = copies.update_position(&mut gnss, &car.fix());
+                let _ = driven.fix(&Vector3::zeros());
             }
         }
     }
@@ -252,82 +277,54 @@ fn gaps_are_doubted_as_much_as_they_do_wrong() {
 #[test]
 fn a_newcomer_takes_over_after_twenty_seconds() {
     for (seed, wrong_s, is_followed) in [(1, 10, false), (2, 19, false), (3, 60, true)] {
-        let mut car = Car::new(seed, QUIET, 0.0);
-        let mut copies: Fixed = copies(QUIET, 0.0, false);
-        copies.start(&car.start(0.3)).unwrap();
-        let mut gnss = stream();
+        let mut driven = FixedCar::quiet(seed, 0.3);
         let mut followed_s = None;
-        for step in 1..=180 * 50 {
-            copies.propagate(&car.drive()).unwrap();
-            if step % 50 != 0 {
-                continue;
-            }
-            let second = step / 50 - 60;
-            let is_wrong = (0..wrong_s).contains(&second);
-            let mut fix = car.fix();
-            if is_wrong {
-                fix.position += Vector3::new(3000.0, -4000.0, 0.0);
-            }
-            let result = copies.update_position(&mut gnss, &fix);
-            if second < 0 {
-                assert!(result.is_ok(), "{result:?}");
-            }
+        driven.by_second(180, |driven, second| {
+            let is_wrong = (60..60 + wrong_s).contains(&second);
+            let away = if is_wrong { Vector3::new(3000.0, -4000.0, 0.0) } else { Vector3::zeros() };
+            let result = driven.fix(&away);
+            assert!(second >= 60 || result.is_ok(), "{result:?}");
             if is_wrong && result.is_ok() {
-                followed_s = followed_s.or(Some(second));
+                followed_s = followed_s.or(Some(second - 60));
             }
-        }
+        });
         assert_eq!(followed_s.is_some(), is_followed, "{wrong_s} s");
         assert!(followed_s.is_none_or(|followed_s| followed_s <= 22), "{followed_s:?}");
         // After a minute of wrong ones, the right ones have been those of the newcomer for a minute.
-        let off = (copies.estimate().unwrap().position - car.position).norm();
+        let off = (driven.copies.estimate().unwrap().position - driven.car.position).norm();
         assert!(off < 2.0, "{wrong_s} s: {off} m off at the end");
-        assert_eq!(copies.best().resets(), if is_followed { 3 } else { 1 });
-        assert_eq!(copies.elsewhere(), None);
+        assert_eq!(driven.copies.best().resets(), if is_followed { 3 } else { 1 });
+        assert_eq!(driven.copies.elsewhere(), None);
     }
 }
 
 #[test]
 fn positions_on_another_part_of_the_earth_do_not_move_the_filter() {
-    let mut car = Car::new(5, QUIET, 0.0);
-    let mut copies: Fixed = copies(QUIET, 0.0, false);
-    copies.start(&car.start(0.3)).unwrap();
-    let mut gnss = stream();
-    for step in 1..=60 * 50 {
-        copies.propagate(&car.drive()).unwrap();
-        if step % 50 == 0 {
-            let mut fix = car.fix();
-            if step > 20 * 50 {
-                fix.position.x += 3e5;
-            }
-            let _ = copies.update_position(&mut gnss, &fix);
-        }
-    }
-    assert!(copies.elsewhere().is_some_and(|distance| distance > 2e5));
+    let mut driven = FixedCar::quiet(5, 0.3);
+    driven.by_second(60, |driven, second| {
+        let _ = driven.fix(&(Vector3::x() * if second > 20 { 3e5 } else { 0.0 }));
+    });
+    assert!(driven.copies.elsewhere().is_some_and(|distance| distance > 2e5));
 }
 
 /// Fixes in two worlds are not compared with each other: their distance is no noise.
 #[test]
 fn another_world_is_no_scatter_of_fixes() {
     let noise_after = |change: fn(&mut Fixed, &Car, &Vector3<f64>)| {
-        let mut car = Car::new(7, QUIET, 0.0);
-        let mut copies: Fixed = copies(QUIET, 0.0, false);
-        copies.start(&car.start(0.3)).unwrap();
-        let (mut gnss, mut world, mut noise) = (stream(), Vector3::zeros(), 0.0_f64);
-        for step in 1..=40 * 50 {
-            copies.propagate(&car.drive()).unwrap();
-            if step == 35 * 50 {
+        let mut driven = FixedCar::quiet(7, 0.3);
+        let (mut world, mut noise) = (Vector3::zeros(), 0.0_f64);
+        driven.by_second(40, |driven, second| {
+            if second == 35 {
                 world = Vector3::new(5000.0, 0.0, 0.0);
-                change(&mut copies, &car, &world);
+                change(&mut driven.copies, &driven.car, &world);
             }
-            if step % 50 == 0 {
-                let fix = car.fix();
-                let fix = GnssPosition { position: fix.position + world, ..fix };
-                if step >= 35 * 50 {
-                    noise = noise.max({ copies.scatter }.fix(&fix).covariance[(0, 0)].sqrt());
-                }
-                copies.update_fix(&mut gnss, &fix).unwrap();
+            let fix = driven.car.fix();
+            let fix = GnssPosition { position: fix.position + world, ..fix };
+            if second >= 35 {
+                noise = noise.max({ driven.copies.scatter }.fix(&fix).covariance[(0, 0)].sqrt());
             }
-        }
+            driven.copies.update_fix(&mut driven.gnss, &fix).unwrap();
+        });
         noise
     };
     let moved = noise_after(|copies, _, world| copies.move_world(&(*world).into()).unwrap());
@@ -348,16 +345,12 @@ laws! {
         numbers in proptest::collection::vec(prop_oneof![any::<f64>(), -10.0..10.0, -1e5..1e5, Just(f64::NAN)], 12),
         dt_ns in any::<i64>(),
     ) {
-        let mut car = Car::new(seed, QUIET, 0.0);
-        let mut copies: Wheels = copies(QUIET, 0.1, true);
-        copies.start(&car.start(heading_deviation)).unwrap();
-        let (mut gnss, mut refused) = (stream(), 0);
-        for step in 1..=10 * 50 {
-            copies.propagate(&car.drive()).unwrap();
-            if step % 50 == 0 {
-                copies.update_fix(&mut gnss, &car.fix()).unwrap();
-            }
-        }
+        let mut driven = WheelsCar::new(Car::new(seed, QUIET, 0.0), copies(QUIET, 0.1, true), heading_deviation);
+        driven.by_second(10, |driven, _| {
+            driven.copies.update_fix(&mut driven.gnss, &driven.car.fix()).unwrap();
+        });
+        let Driven { car, copies, mut gnss } = driven;
+        let mut refused = 0;
         let states = |copies: &Wheels| format!("{:?} {:?}", copies.starts, copies.search);
         let vector = |first: usize| Vector3::new(numbers[first], numbers[first + 1], numbers[first + 2]);
         let fix = GnssPosition::new(vector(0), numbers[3], numbers[4]);
