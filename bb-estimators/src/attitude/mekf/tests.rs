@@ -171,7 +171,7 @@ fn north_is_turned_by_the_declination() {
     usual.update(&magnetic.sample(false)).unwrap();
     magnetic.run(&mut usual, 20, true);
     let errors = [world.error_of(&turned), magnetic.error_of(&usual)];
-    assert!((errors[0].total - errors[1].total).abs() < 1e-6 && errors[0].total < 1.5, "{errors:?}");
+    assert!((errors[0].total - errors[1].total).abs() < 0.02 && errors[0].total < 1.5, "{errors:?}");
 }
 
 /// A plane in a turn: the specific force stays where it is in the body, and only the velocity tells that it is not the weight.
