@@ -39,7 +39,7 @@ fn degraded_positions_that_agree_on_another_place_move_the_estimate() {
             Sent::Anchor(anchor) if anchor.time_ns > 4 * SECOND => flight.moving(sent, off),
             _ => *sent,
         });
-        // The first frame after a jump begins anew.
+        // The first frame after a jump may be refused; only anchors count.
         let overruled = flown.iter().filter(|flown| matches!(flown.sent, Sent::Anchor(_))).filter_map(|flown| {
             let error = flown.result.err()?;
             assert!(flown.sent.time_ns() > 4 * SECOND && !error.is_fatal(), "{strategy:?}: {error}");
